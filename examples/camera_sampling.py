@@ -1,4 +1,4 @@
-"""Viewpoints by rules: how many of each room, what they see, why others were refused."""
+"""Choice of viewpoints by rules: number per room, what they see, why others were refused."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Classes of one's own by a table: what counts as what, in labels and exports."""
+"""A custom class table for labels and exports."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""A walk through a home as a GIF, with the way's poses."""
+"""A walk through a home as a GIF, with its poses."""
 
 import sys
 

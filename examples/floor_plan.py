@@ -1,4 +1,4 @@
-"""A plan of one's own becomes a home: rooms in metres, doors and windows."""
+"""A home from your own plan: rooms in metres, doors and windows."""
 
 import json
 from pathlib import Path

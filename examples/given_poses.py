@@ -1,4 +1,4 @@
-"""Pictures from poses of one's own: OpenCV axes, a K of one's own."""
+"""Pictures from given poses: OpenCV axes and a given K."""
 
 import sys
 

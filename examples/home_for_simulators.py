@@ -1,4 +1,4 @@
-"""A lived-in home as one glTF scene, and as an OpenUSD stage for Isaac Sim where the extra usd is there."""
+"""A lived-in home as one glTF scene, and as an OpenUSD stage for Isaac Sim if the extra usd is installed."""
 
 import sys
 from importlib.util import find_spec

@@ -1,4 +1,4 @@
-"""Colour and depth as a first Kinect would have given them."""
+"""Colour and depth as from a first-generation Kinect."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Lamps of another flux and colour, a bulb added, a spot that shines on the floor."""
+"""Lamps with another flux and colour, an added bulb, a spot on the floor."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""A generated flat of two bedrooms, dressed: no home drawn by anybody."""
+"""A generated and dressed flat with two bedrooms."""
 
 import pbrs_farm as pf
 

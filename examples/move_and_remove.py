@@ -1,4 +1,4 @@
-"""Things moved, turned and taken away; the home before stays as it was."""
+"""Items moved, turned and removed; the original home is unchanged."""
 
 import sys
 

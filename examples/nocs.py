@@ -1,4 +1,4 @@
-"""Where on its model each pixel of a placed thing lies: NOCS coordinates."""
+"""NOCS coordinates: the point on its model for each pixel of a placed object."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""The 6-D pose of a placed model in the camera's axes, and where it falls in the picture."""
+"""The 6-D pose of a placed model in the camera's axes, and its projection into the picture."""
 
 import sys
 

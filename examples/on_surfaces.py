@@ -1,4 +1,4 @@
-"""Models of one's own on the tables, shelves and the floor of one room."""
+"""Your own models on the tables, shelves and the floor of one room."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""Cameras on a ring around a thing, for reconstruction; exported for nerfstudio."""
+"""Cameras on a ring around an item, for reconstruction; exported for nerfstudio."""
 
 import sys
 from math import cos, pi, sin

@@ -1,4 +1,4 @@
-"""A coloured cloud of what a camera sees, as PLY."""
+"""A coloured point cloud of a camera's view, as PLY."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""A function of a seed as a data set: every home goes to this machine's processes."""
+"""A data set from a function of a seed: every home is sent to this machine's processes."""
 
 import sys
 

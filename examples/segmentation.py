@@ -1,4 +1,4 @@
-"""Classes and instances as arrays, and one's own class table over them."""
+"""Classes and instances as arrays, and a custom class table applied to them."""
 
 import sys
 

@@ -1,4 +1,4 @@
-"""A panorama of one's own outside: light and what windows show."""
+"""Your own panorama outside: its light and the view through the windows."""
 
 import sys
 from pathlib import Path

@@ -1,4 +1,4 @@
-"""Frames along a trajectory of one's own: TUM rows of time, position and quaternion."""
+"""Frames along your own trajectory: TUM rows of time, position and quaternion."""
 
 import sys
 from pathlib import Path

@@ -76,11 +76,11 @@ def examine(store_url: str = "", redis_url: str = "") -> list[Finding]:
         _python(),
         packages(),
         llvm(),
-        *_variants(),
+        *renderer_variants(),
         probe(GL, check_gl, _gl_remedy(), state="degraded"),
         probe("denoiser", check_denoiser, again, needed=True),
         probe("pictures", check_pictures, again, needed=True),
-        _extras(),
+        optional_extras(),
         redis(redis_url),
         _store(store_url),
     ]
@@ -113,7 +113,7 @@ def packages() -> Finding:
     return Finding("packages", "ok", ", ".join(versions))
 
 
-def _extras() -> Finding:
+def optional_extras() -> Finding:
     missing = missing_extras()
     if not missing:
         # The extra `all` excludes torch, which is large and only used to train networks.
@@ -136,7 +136,7 @@ def llvm() -> Finding:
     return Finding("LLVM", "degraded", text, llvm_command())
 
 
-def _variants() -> list[Finding]:
+def renderer_variants() -> list[Finding]:
     findings = [
         probe(f"mitsuba {n}", check_variant, _variant_remedy(n), argument=n, state="degraded")
         for n in _VARIANTS

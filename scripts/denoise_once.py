@@ -1,9 +1,9 @@
-"""Prints the SHA-256 of a picture that Open Image Denoise made, asked as pbrs_farm asks it.
+"""Prints the SHA-256 of a picture by Open Image Denoise, called as pbrs_farm calls it.
 
-    python scripts/denoise_once.py .../pyoidn/oidn/lib/libOpenImageDenoise.so
+python scripts/denoise_once.py .../pyoidn/oidn/lib/libOpenImageDenoise.so
 
-Needs nothing but the library, so that libraries packed for one Python can be tried by another.
-The picture is noise of 64x48; effects: threads of the denoiser. Exits 1 with its error when it refuses.
+Needs only the library, so that libraries packed for one Python can be tried with another.
+The picture is noise of 64x48; effects: threads of the denoiser. Exits 1 with the denoiser's error.
 """
 
 from __future__ import annotations
@@ -19,7 +19,7 @@ SIZE: Final = (64, 48)
 _CPU: Final = 1
 _FLOAT3: Final = 3
 _HIGH: Final = 6
-# The part of OpenImageDenoise/oidn.h that is used here: what a call returns and takes.
+# The used functions of OpenImageDenoise/oidn.h: types of results and arguments.
 _CALLS: Final[dict[str, tuple[Any, list[Any]]]] = {
     "oidnNewDevice": (c_void_p, [c_int]),
     "oidnCommitDevice": (None, [c_void_p]),

@@ -1,6 +1,6 @@
 """Pages of the site that the repository has in another form: its own files (../NOTICE), and notebooks.
 
-Effects: MkDocs'. A notebook is shown as a page with a link to its file; links to NAME.ipynb lead to the page.
+Effects: MkDocs'. A notebook becomes a page with a link to its file; links to NAME.ipynb lead to the page.
 """
 
 from __future__ import annotations
@@ -35,7 +35,7 @@ def on_files(files: Files, config: Any) -> Files:
 
 
 def page_of_notebook(notebook: Path) -> str:
-    """The cells of a notebook as Markdown: text as it is, code in fences; below the title where its file is."""
+    """The cells of a notebook as Markdown: text unchanged, code in fences; a link to its file below the title."""
     cells = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
     parts = []
     for cell in cells:
@@ -49,7 +49,7 @@ def page_of_notebook(notebook: Path) -> str:
 
 
 def on_page_content(html: str, **_rest: Any) -> str:
-    """Show a poster that links to a film as that film, which plays in the page."""
+    """Replace a poster that links to a film with the film, which plays in the page."""
     poster = r'<a href="([^"]+\.mp4)"><img alt="([^"]*)" src="([^"]+)" ?/?></a>'
     film = r'<video controls loop muted playsinline preload="none" src="\1" poster="\3" title="\2"></video>'
     return re.sub(poster, film, html)

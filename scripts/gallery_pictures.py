@@ -1,11 +1,11 @@
 """The gallery's forty rooms: cameras, pictures, credits, and their table in docs/gallery.md.
 
-    python scripts/gallery_pictures.py                the pictures that out/gallery lacks, then the page
-    python scripts/gallery_pictures.py --part 0 of 2  every second one: a process a core, then without it
+    python scripts/gallery_pictures.py                the pictures missing in out/gallery, then the page
+    python scripts/gallery_pictures.py --part 0 of 2  every second one: one process per core, then without it
 
-docs/pictures/gallery/homes.csv says which homes, and the room that is shown where a home has one. Of its
-views the best is rendered, as the page's own command renders it.
-Effects: out/gallery, docs/pictures/gallery, docs/gallery.md. Remove out/gallery when homes have changed.
+docs/pictures/gallery/homes.csv lists the homes, and the room to show where it names one. The best of
+a home's views is rendered with the page's command.
+Effects: out/gallery, docs/pictures/gallery, docs/gallery.md. Remove out/gallery if homes have changed.
 """
 
 from __future__ import annotations
@@ -40,7 +40,7 @@ SIZE: Final[dict[str, Any]] = {"image.width_px": 640, "image.height_px": 480}
 
 
 def main(words: Sequence[str]) -> None:
-    """Render what is missing; draw the page unless only a part was asked for."""
+    """Render the missing pictures; write the page unless only a part was requested."""
     with (PICTURES / "homes.csv").open(encoding="utf-8") as file:
         homes = list(csv.DictReader(file))
     part, of = (int(words[1]), int(words[3])) if words[:1] == ["--part"] else (0, 1)
@@ -52,7 +52,7 @@ def main(words: Sequence[str]) -> None:
 
 
 def render(row: dict[str, str]) -> str:
-    """A home's best view of the room wanted, as a root in out/gallery and a picture; the view's id."""
+    """Render a home's best view of the requested room, as a root in out/gallery and a picture; returns the view's id."""
     home = pf.load(row["home"], recipe="preview").set(**SIZE).dress(7)
     kinds = {
         room.id: room_kind(
@@ -83,7 +83,7 @@ def render(row: dict[str, str]) -> str:
 
 
 def write_page(homes: Iterable[dict[str, str]]) -> None:
-    """docs/pictures/gallery and the table of docs/gallery.md, of what is in out/gallery."""
+    """Write docs/pictures/gallery and the table of docs/gallery.md from out/gallery."""
     cells, credited = [], {head: set[str]() for head in HEADS}
     for row in homes:
         number, root = row["number"], OUT / row["number"]
@@ -111,7 +111,7 @@ VERSIONS: Final = r"They show version [\d.]+ of furnishing and \d+ of dressing\.
 
 
 def versions_line() -> str:
-    """What the page says of the versions that made its pictures."""
+    """The page's line about the versions that made its pictures."""
     versions = versions_of_passes()
     return f"They show version {versions['furnish']} of furnishing and {versions['dress']} of dressing."
 
@@ -124,14 +124,14 @@ def _cell(number: str, home: str, what: str) -> str:
 
 
 def _credits(text: str) -> dict[str, set[str]]:
-    """Head -> its lines, of an ATTRIBUTION.txt."""
-    found: dict[str, set[str]] = {}
+    """Head -> lines of an ATTRIBUTION.txt."""
+    credits: dict[str, set[str]] = {}
     for line in text.splitlines():
         if line in HEADS:
-            lines = found.setdefault(line, set())
-        elif found and line.startswith("- "):
+            lines = credits.setdefault(line, set())
+        elif credits and line.startswith("- "):
             lines.add(line)
-    return found
+    return credits
 
 
 if __name__ == "__main__":

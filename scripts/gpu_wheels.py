@@ -2,12 +2,12 @@
 
 Effects: fetches wheels with pip, denoises a picture twice, writes FOLDER/wheels-VERSION.tar.xz.
 
-The archive holds the files of the published wheels, unpacked side by side, less those that
-gpu_wheels.txt leaves out because the check opens none of them. Libraries are cut copies, for this
-check only: what the loader does not map is blanked (debug data, symbol tables), and so are those
-networks of Open Image Denoise that pbrs_farm does not ask for, 42 of its 51 MB. That library is cut
-only if a picture comes out the same bits before and after; else it is packed whole.
-CUT.txt, packed with them, names every library that was changed.
+The archive holds the files of the published wheels, unpacked side by side, without those that
+gpu_wheels.txt excludes because the check opens none of them. Libraries are reduced copies, for this
+check only: parts that the loader does not map are blanked (debug data, symbol tables), and so are the
+networks of Open Image Denoise that pbrs_farm does not use, 42 of its 51 MB. That library is reduced
+only if a picture has the same bits before and after; else it is packed whole.
+CUT.txt, packed with them, names every changed library.
 """
 
 from __future__ import annotations
@@ -28,12 +28,12 @@ from library_cuts import without_debug, without_networks
 HERE: Final = Path(__file__).resolve().parent
 EXTRAS: Final = ("workers",)
 TEST_PACKAGES: Final = ("pytest", "hypothesis")
-# What a requirement asks for below Python 3.11.3 only: pip judges that by the Python that packs.
+# Required below Python 3.11.3 only: pip would decide by the Python that runs this script.
 _FOR_OLDER_PYTHON: Final = ("async-timeout",)
-# Dependencies that nothing in the check imports: tables, the board's pages, a coordinator's figures.
+# Dependencies that the check never imports: tables, the board's pages, a coordinator's metrics.
 NOT_CARRIED: Final = ("pyarrow", "jinja2", "prometheus-client")
 DENOISER: Final = "pyoidn/oidn/lib"
-# What color, albedo and normal, hdr and cleanAux, of high quality are denoised by.
+# Network for color, albedo and normal with hdr and cleanAux, at high quality.
 NETWORK: Final = "rt_hdr_calb_cnrm_large"
 NOTICE_OF_DEBUG: Final = """\
 Cut copies, for scripts/gpu_check.sh of pbrs_farm only: in the libraries named here, everything that
@@ -49,12 +49,12 @@ licence below.
 
 """
 _PATIENCE_S: Final = 300  # for a picture of 64x48
-# pip takes each by its exact name.
+# pip needs each by its exact name.
 _ABIS: Final = "_2_28 _2_27 _2_24 _2_17 2014 _2_12 2010 _2_5 1"
 
 
 def main() -> None:
-    """Fetch, leave out, cut, pack; say how large the archive is."""
+    """Fetch, select, reduce and pack the files; print the size of the archive."""
     parser = argparse.ArgumentParser(description="pack the libraries of the GPU check")
     parser.add_argument("folder", type=Path)
     parser.add_argument("python", nargs="?", default="{}.{}".format(*sys.version_info[:2]))
@@ -66,8 +66,8 @@ def main() -> None:
         shown = cut_networks(site / DENOISER)
         cut_debug(site, carried(site))
         if shown and shown != (now := picture_or_fault(site / DENOISER)):
-            said = f"the denoiser makes another picture or none: {now}"
-            parser.exit(1, f"gpu_wheels: without debug data {said}\n")
+            reason = f"the denoiser makes another picture or none: {now}"
+            parser.exit(1, f"gpu_wheels: without debug data {reason}\n")
         files = carried(site)
         archive = args.folder / f"wheels-{args.python}.tar.xz"
         pack(site, files, archive)
@@ -77,14 +77,14 @@ def main() -> None:
 
 
 def requirements() -> list[str]:
-    """What pyproject.toml asks for, less NOT_CARRIED, and what runs the tests."""
+    """The requirements of pyproject.toml without NOT_CARRIED, plus those of the tests."""
     text = (HERE.parent / "pyproject.toml").read_text(encoding="utf-8")
     project = tomllib.loads(text)["project"]
-    asked = list(project["dependencies"])
+    texts = list(project["dependencies"])
     for extra in EXTRAS:
-        asked += project["optional-dependencies"][extra]
+        texts += project["optional-dependencies"][extra]
     return [
-        *(r for r in asked if not r.startswith(NOT_CARRIED)),
+        *(r for r in texts if not r.startswith(NOT_CARRIED)),
         *TEST_PACKAGES,
         *_FOR_OLDER_PYTHON,
     ]
@@ -99,7 +99,7 @@ def fetch(site: Path, python: str) -> None:
 
 
 def rules() -> list[tuple[bool, str]]:
-    """(packed, pattern) of each line of gpu_wheels.txt."""
+    """(packed, pattern) for each line of gpu_wheels.txt."""
     lines = (HERE / "gpu_wheels.txt").read_text(encoding="utf-8").splitlines()
     return [(line[0] == "+", line[2:]) for line in lines if line[:1] in ("+", "-")]
 
@@ -110,18 +110,18 @@ def is_carried(path: str) -> bool:
 
 
 def carried(site: Path) -> list[str]:
-    """Files to pack, below site: texts first, then code, each kind by name, so that like is near like."""
+    """Files to pack, below site: texts first, then code, each kind by name, so that similar files are adjacent."""
     files = [p.relative_to(site).as_posix() for p in site.rglob("*") if p.is_file()]
     by_kind = sorted(files, key=lambda path: (".so" in path, path.rpartition("/")[2], path))
     return [path for path in by_kind if is_carried(path)]
 
 
 def cut_networks(denoiser: Path) -> str:
-    """Blank the networks of Open Image Denoise that pbrs_farm never asks for; CUT.txt says so.
+    """Blank the networks of Open Image Denoise that pbrs_farm never uses, and record it in CUT.txt.
 
-    denoiser: the folder of its libraries. Returns the hash of a picture that they make, "" where this
-    machine cannot tell. They stay whole, and a line says why, then and when the networks are not found, or
-    a picture does not come out the same bits.
+    denoiser: the folder of its libraries. Returns the hash of a picture that they make, "" if this
+    machine cannot compute it. The networks stay whole, with a printed reason, in that case and if they
+    are not found or the picture changes.
     """
     core = next(denoiser.glob("libOpenImageDenoise_core.so.*"))
     whole, before = core.read_bytes(), ""
@@ -140,7 +140,7 @@ def cut_networks(denoiser: Path) -> str:
 
 
 def cut_debug(site: Path, files: list[str]) -> None:
-    """Blank what the loader does not map of the libraries among the files; CUT.txt names them."""
+    """Blank unmapped parts of the libraries among the files; CUT.txt names them."""
     changed = []
     for path in (p for p in files if ".so" in p):
         whole = (site / path).read_bytes()
@@ -152,9 +152,9 @@ def cut_debug(site: Path, files: list[str]) -> None:
 
 
 def picture(denoiser: Path) -> str:
-    """Hash of a picture denoised by the libraries of that folder; ValueError says why there is none.
+    """Hash of a picture denoised by the libraries of that folder; raises ValueError with the denoiser's error.
 
-    Another process loads them, so that each call sees what the folder holds now.
+    A separate process loads them, so that each call uses the folder's current libraries.
     """
     library = denoiser / "libOpenImageDenoise.so"
     command = [sys.executable, str(HERE / "denoise_once.py"), str(library)]
@@ -165,13 +165,13 @@ def picture(denoiser: Path) -> str:
     except subprocess.TimeoutExpired as late:
         raise ValueError(f"no picture within {_PATIENCE_S} s") from late
     if done.returncode:
-        said = done.stderr.strip().rpartition("\n")[2]
-        raise ValueError(said or f"its process ended with {done.returncode}")
+        message = done.stderr.strip().rpartition("\n")[2]
+        raise ValueError(message or f"its process ended with {done.returncode}")
     return done.stdout
 
 
 def picture_or_fault(denoiser: Path) -> str:
-    """As picture(), or why there is none."""
+    """picture(), or the text of its error."""
     try:
         return picture(denoiser)
     except ValueError as error:
@@ -179,7 +179,7 @@ def picture_or_fault(denoiser: Path) -> str:
 
 
 def pack(site: Path, files: list[str], archive: Path) -> None:
-    """Write one compressed stream; without owners and clocks, so that equal wheels give equal bytes."""
+    """Write one compressed stream without owners and clocks, so that equal wheels give equal bytes."""
     preset = {"preset": 9 | lzma.PRESET_EXTREME, "dict_size": 1 << 27}
     filters = [{"id": lzma.FILTER_X86}, {"id": lzma.FILTER_LZMA2, **preset}]
     with (

@@ -1,14 +1,14 @@
-"""The pictures of docs/howto, drawn from what the pages' own commands leave in out/.
+"""The pictures of docs/howto, drawn from the files that the pages' commands write to out/.
 
     python scripts/howto_pictures.py [PAGE ...]
 
-Run a page's commands first (a view or two at 320x240 will do); a page whose files are missing is named and
-left as it is. Some want more than their page: photos/*.png are photographs of yours (predict, train's views
+Run a page's commands first (a view or two at 320x240 is enough); a page with missing files is named and
+skipped. Some need more than their page: photos/*.png are your photographs (predict, train's views
 under viewseen/, photographs, photographs_seen), farm.png and job.png are screenshots of the board, spp4 to spp256 are runs of
 the last line of light_costs.md, back is simulators.md's export rendered again, ownviews a run with own_furniture.md's
 catalogue, light/NN_NAME.png the pictures of relight.md's table, resume_sums.npz the sums that a killed view leaves
 beside its outputs. A name in PAGES is that of a picture, which a page shows.
-Effects: reads out/, writes docs/pictures/howto/NAME.jpg, 640 pixels wide (screenshots as wide as they are) and
+Effects: reads out/, writes docs/pictures/howto/NAME.jpg, 640 pixels wide (screenshots at full width) and
 at most 60 kB, and the pictures of relight.md, compare.md and train.md beside them.
 """
 
@@ -42,7 +42,7 @@ Pixels = NDArray[np.uint8]
 
 
 def row(*panels: Any) -> Image.Image:
-    """Panels side by side, each as high as the first, together WIDTH_PX wide."""
+    """Panels side by side at the first one's height, together WIDTH_PX wide."""
     images = [p if isinstance(p, Image.Image) else Image.fromarray(np.asarray(p)) for p in panels]
     shares = [i.width / i.height for i in images]
     height = round((WIDTH_PX - GAP_PX * (len(images) - 1)) / sum(shares))
@@ -67,15 +67,15 @@ def rows(*sheets: Image.Image) -> Image.Image:
 
 
 def first(pattern: str, skip: int = 0) -> Path:
-    """The file or folder of out/ that a pattern finds, skip of them passed over."""
-    found = sorted(OUT.glob(pattern))
-    if len(found) <= skip:
+    """The first match of a pattern in out/ after skip others."""
+    matches = sorted(OUT.glob(pattern))
+    if len(matches) <= skip:
         raise FileNotFoundError(f"out/{pattern}")
-    return found[skip]
+    return matches[skip]
 
 
 def blended(picture: Pixels, colours: Pixels, where: NDArray[np.bool_]) -> Pixels:
-    """A picture under half transparent colours."""
+    """A picture blended with half transparent colours."""
     mixed = (0.45 * picture + 0.55 * colours).astype(np.uint8)
     return np.where(where[..., None], mixed, picture // 2 + 90)
 
@@ -157,8 +157,8 @@ def _of_coco(n: int) -> Image.Image:
     for k, a in enumerate(a for a in document["annotations"] if a["image_id"] == shown["id"]):
         if names[a["category_id"]]["supercategory"] == "structure":
             continue
-        seen = mask.decode(a["segmentation"]).astype(bool)
-        colours[seen], where = PALETTE[k % len(PALETTE)], where | seen
+        visible = mask.decode(a["segmentation"]).astype(bool)
+        colours[visible], where = PALETTE[k % len(PALETTE)], where | visible
         boxes.append((a["area"], a["bbox"], names[a["category_id"]]["name"], k))
     image = Image.fromarray(np.where(where[..., None], (picture // 2 + colours // 2), picture))
     draw = ImageDraw.Draw(image)
@@ -170,7 +170,7 @@ def _of_coco(n: int) -> Image.Image:
 
 
 def questions() -> Image.Image:
-    """A picture with the things of its phrases, and four of its questions."""
+    """A picture with the items of its phrases, and four of its questions."""
     folder = first("questions/rows/*/refs.json").parent
     refs = json.loads((folder / "refs.json").read_text())
     medium = refs[0]["file_name"]
@@ -185,16 +185,16 @@ def questions() -> Image.Image:
         x, y, width, height = (scale * v for v in boxes[ref["ann_id"]])
         colour = tuple(int(c) for c in PALETTE[k % len(PALETTE)])
         draw.rectangle((x, y, x + width, y + height), outline=colour)
-        said = ref["sentences"][-1]["sent"]
-        draw.text((x + 2, y + 1), said, fill="white", stroke_width=1, stroke_fill="black")
-    asked = [json.loads(line) for line in (folder / "questions.jsonl").read_text().splitlines()]
+        phrase = ref["sentences"][-1]["sent"]
+        draw.text((x + 2, y + 1), phrase, fill="white", stroke_width=1, stroke_fill="black")
+    questions = [json.loads(line) for line in (folder / "questions.jsonl").read_text().splitlines()]
     kinds = (
         "object_counting",
         "object_abs_distance",
         "object_rel_distance",
         "object_rel_direction_easy",
     )
-    of_kind = {q["question_type"]: q for q in asked if q["media"] == medium}
+    of_kind = {q["question_type"]: q for q in questions if q["media"] == medium}
     page = Image.new("RGB", (WIDTH_PX, 22 * len(kinds) + 8), "white")
     draw = ImageDraw.Draw(page)
     for k, question in enumerate(of_kind[kind] for kind in kinds if kind in of_kind):
@@ -242,9 +242,9 @@ def predict() -> Image.Image:
 
 def train() -> Image.Image:
     frame = pf.open("out/train/homes")[0]
-    seen = first(f"viewseen/{frame.id.replace('/', '_')}_normal.png")
+    normals = first(f"viewseen/{frame.id.replace('/', '_')}_normal.png")
     truth = (frame.layer("normal") // 257).astype(np.uint8)
-    return row(frame.colour, truth, normals_of(seen))
+    return row(frame.colour, truth, normals_of(normals))
 
 
 def normals_of(path: Path) -> Pixels:
@@ -281,11 +281,11 @@ def estimate() -> Image.Image:
 
 
 def resume() -> Image.Image:
-    """What an interrupted view had kept (out/resume_sums.npz), and the view when it is done."""
-    kept, frame = np.load(OUT / "resume_sums.npz"), pf.open("out/resume")[0]
+    """The stored sums of an interrupted view (out/resume_sums.npz), and the finished view."""
+    sums, frame = np.load(OUT / "resume_sums.npz"), pf.open("out/resume")[0]
     house, view = frame.id.split("/")
     means = (
-        kept[f"path/{name}"].reshape(frame.colour.shape) / np.float32(kept["path/spp"])
+        sums[f"path/{name}"].reshape(frame.colour.shape) / np.float32(sums["path/spp"])
         for name in ("outdoor", "indoor", "albedo", "normal")
     )
     recipe = recipe_from_json((OUT / "resume/recipe.json").read_text(), "recipe.json")
@@ -304,11 +304,11 @@ def photographs() -> None:
 
 def photographs_seen() -> None:
     """docs/pictures/photographs_seen.jpg: each photograph beside its normals, classes and edges."""
-    said = ("seen", "classes", "edges")  # where train.md's commands write
+    outputs = ("seen", "classes", "edges")  # output folders of train.md's commands
     sheets = [
         row(
             Image.open(photo),
-            *(Image.open(OUT / "train" / task / f"{photo.stem}_shown.png") for task in said),
+            *(Image.open(OUT / "train" / task / f"{photo.stem}_shown.png") for task in outputs),
         )
         for photo in sorted(OUT.glob("photos/*.png"))
     ]
@@ -339,12 +339,12 @@ PAGES: Final[dict[str, Callable[[], Image.Image]]] = {
 }  # fmt: skip
 
 
-# Pictures of other pages, which save themselves.
+# Functions for other pages' pictures, which save their own files.
 OTHERS: Final = {f.__name__: f for f in (switches, photographs, photographs_seen)}
 
 
 def main(names: Iterable[str]) -> None:
-    """Draw what is named, else all."""
+    """Draw the named pictures, by default all."""
     for name in names or (*PAGES, *OTHERS):
         try:
             if name in OTHERS:
@@ -356,7 +356,7 @@ def main(names: Iterable[str]) -> None:
 
 
 def save(image: Image.Image, name: str) -> None:
-    """As a JPEG of at most MAX_BYTES."""
+    """Save as a JPEG of at most MAX_BYTES."""
     PICTURES.mkdir(parents=True, exist_ok=True)
     path = PICTURES / f"{name}.jpg"
     for quality in range(90, 20, -5):

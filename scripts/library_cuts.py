@@ -1,4 +1,4 @@
-"""Blanks what a run never reads of a shared library, so that it compresses to nothing; no effects.
+"""Blanks unused parts of a shared library, so that they compress to nothing; no effects.
 
 A blanked range is zeros of the same length: every address stays, so the library loads as before.
 Format: System V ABI, ELF-64, chapters 4 and 5; networks of Open Image Denoise: its core/tza.cpp.
@@ -19,7 +19,7 @@ _TZA_MAGIC: Final = b"\xd7\x41"
 
 
 class Section(NamedTuple):
-    """A row of the section header table: what it holds, and where in the file."""
+    """A row of the section header table: kind, flags and place in the file."""
 
     kind: int
     flags: int
@@ -37,9 +37,9 @@ class Segment(NamedTuple):
 
 
 def without_debug(library: bytes) -> bytes:
-    """The library with every section blanked that the loader does not map: debug data, symbol tables.
+    """The library with all sections blanked that the loader does not map: debug data, symbol tables.
 
-    What is no ELF-64 file comes back as it is.
+    A file that is not ELF-64 is returned unchanged.
     """
     if not _is_elf(library):
         return library
@@ -61,8 +61,8 @@ def without_debug(library: bytes) -> bytes:
 def without_networks(library: bytes, kept: str) -> bytes:
     """Open Image Denoise's core with all networks blanked but one, by name ("rt_hdr").
 
-    A filter that asks for another one then fails with "invalid or corrupted weights blob".
-    Raises ValueError when the library does not hold the networks where they are looked for.
+    A filter that needs another one then fails with "invalid or corrupted weights blob".
+    Raises ValueError if the networks are not found in the library.
     """
     networks = _networks(library)
     if kept not in networks:
@@ -71,30 +71,30 @@ def without_networks(library: bytes, kept: str) -> bytes:
 
 
 def _networks(library: bytes) -> dict[str, tuple[int, int]]:
-    """Name of a network -> (start, stop) in the file, by the symbols that the library exports."""
+    """Name of a network -> (start, stop) in the file, from the library's exported symbols."""
     if not _is_elf(library):
         raise ValueError("no ELF-64 file")
     sections, segments = _sections(library), _segments(library)
-    found = {}
+    networks = {}
     for table in (s for s in sections if s.kind == _DYNSYM):
         names = sections[table.link].start
         for name_at, _info, _other, _section, address, size in struct.iter_unpack(
             "<IBBHQQ", library[table.start : table.stop]
         ):
-            at = names + name_at
-            symbol = library[at : library.index(b"\0", at)].decode()
+            name_place = names + name_at
+            symbol = library[name_place : library.index(b"\0", name_place)].decode()
             if symbol.startswith(_NETWORK):
                 # 6rt_hdrE: the length of a name, and the name.
                 name = symbol.removeprefix(_NETWORK).lstrip("0123456789").removesuffix("E")
-                found[name] = _place(segments, address, size)
-    for name, (start, stop) in found.items():
+                networks[name] = _place(segments, address, size)
+    for name, (start, stop) in networks.items():
         if stop <= start or library[start : start + 2] != _TZA_MAGIC:
             raise ValueError(f"no network where its symbol says {name} is")
-    return found
+    return networks
 
 
 def _place(segments: list[Segment], address: int, size: int) -> tuple[int, int]:
-    """(start, stop) in the file of what lies at an address; ValueError where nothing does."""
+    """(start, stop) in the file of the data at an address; ValueError if no segment holds it."""
     for segment in segments:
         start = segment.start + address - segment.address
         if segment.start <= start and start + size <= segment.stop:
@@ -103,7 +103,7 @@ def _place(segments: list[Segment], address: int, size: int) -> tuple[int, int]:
 
 
 def _is_elf(library: bytes) -> bool:
-    """Whether it is ELF of 64 bits, little-endian."""
+    """True for a little-endian 64-bit ELF file."""
     return library[:6] == b"\x7fELF\x02\x01" and len(library) >= 64
 
 
@@ -112,21 +112,26 @@ def _sections(library: bytes) -> list[Section]:
     (start,) = struct.unpack_from("<Q", library, 40)
     each, n = struct.unpack_from("<HH", library, 58)
     rows = (struct.unpack_from("<IIQQQQI", library, start + i * each) for i in range(n))
-    return [Section(kind, flags, at, at + size, link) for _, kind, flags, _, at, size, link in rows]
+    return [
+        Section(kind, flags, first, first + size, link)
+        for _, kind, flags, _, first, size, link in rows
+    ]
 
 
 def _segments(library: bytes) -> list[Segment]:
-    """What the loader maps of the file."""
+    """The segments that the loader maps."""
     (start,) = struct.unpack_from("<Q", library, 32)
     each, n = struct.unpack_from("<HH", library, 54)
     rows = (struct.unpack_from("<IIQQQQ", library, start + i * each) for i in range(n))
     return [
-        Segment(at, at + size, address) for kind, _, at, address, _, size in rows if kind == _LOAD
+        Segment(first, first + size, address)
+        for kind, _, first, address, _, size in rows
+        if kind == _LOAD
     ]
 
 
 def _blanked(library: bytes, places: Iterable[tuple[int, int]]) -> bytes:
-    """The same bytes with zeros at (start, stop)."""
+    """The same bytes with zeros in the ranges (start, stop)."""
     cut = bytearray(library)
     for start, stop in places:
         cut[start:stop] = bytes(stop - start)

@@ -1,8 +1,8 @@
-"""Which dependencies have wheels on which system, asked of the package index by pip, as a table for docs/install.md.
+"""Dependencies that have wheels, by system, according to the package index: a table for docs/install.md.
 
-Effects: asks the package index, downloads nothing; with a page named, writes the table into it.
+Effects: queries the package index with pip, downloads nothing; writes the table into the page, if one is named.
 
-    python scripts/wheel_table.py docs/install.md
+python scripts/wheel_table.py docs/install.md
 """
 
 from __future__ import annotations
@@ -32,60 +32,60 @@ _BEGIN, _END = "<!-- wheels: scripts/wheel_table.py -->\n", "<!-- end of wheels 
 
 
 def dependencies(pyproject: Mapping[str, object]) -> dict[str, list[str]]:
-    """Requirements without markers, by the extra that brings them; "" for those of every installation.
+    """Requirements without markers, by extra; "" for those of every installation.
 
-    Those of the extras that only developers want are left out.
+    Extras for developers only are excluded.
     """
     project: dict = pyproject["project"]  # type: ignore[assignment, type-arg]
     groups = {"": project["dependencies"], **project["optional-dependencies"]}
-    # An extra of a package is its own affair: only the package is asked for.
+    # An extra of a dependency does not matter: only the package is looked up.
     return {
-        extra: [re.sub(r"\[.*?\]|;.*", "", text).strip() for text in wanted]
-        for extra, wanted in groups.items()
+        extra: [re.sub(r"\[.*?\]|;.*", "", text).strip() for text in requirements]
+        for extra, requirements in groups.items()
         if extra not in _OTHERS
     }
 
 
 def without_wheel(requirements: Iterable[str], platforms: Iterable[str]) -> list[str]:
-    """The names among requirements of which pip finds no wheel, new enough, for a system."""
+    """Names of the requirements for which pip finds no recent enough wheel on a system."""
     options = [word for name in platforms for word in ("--platform", name)]
-    asked = [sys.executable, "-m", "pip", "index", "versions", "--pre", "--only-binary", ":all:"]
-    asked += ["--python-version", PYTHON, "--disable-pip-version-check", *options]
+    command = [sys.executable, "-m", "pip", "index", "versions", "--pre", "--only-binary", ":all:"]
+    command += ["--python-version", PYTHON, "--disable-pip-version-check", *options]
     lacking = []
     for requirement in dict.fromkeys(requirements):
         needed = Requirement(requirement)
-        done = subprocess.run([*asked, needed.name], capture_output=True, text=True, check=False)
-        found = re.search(r"Available versions: (.*)", done.stdout)
-        if not found and "No matching distribution" not in done.stderr:
+        done = subprocess.run([*command, needed.name], capture_output=True, text=True, check=False)
+        match = re.search(r"Available versions: (.*)", done.stdout)
+        if not match and "No matching distribution" not in done.stderr:
             raise SystemExit(f"wheel_table: {needed.name}: {done.stderr.strip()[-500:]}")
-        if not found or not any(needed.specifier.contains(v) for v in found[1].split(", ")):
+        if not match or not any(needed.specifier.contains(v) for v in match[1].split(", ")):
             lacking.append(needed.name)
     return lacking
 
 
 def table(groups: Mapping[str, list[str]], lacking: Mapping[str, set[str]]) -> str:
-    """A row an extra, a column a system: "all", or the packages that have no wheel there."""
+    """A row per extra, a column per system: "all", or the packages without a wheel there."""
     lines = ["| extra | " + " | ".join(lacking) + " |", "|---" * (len(lacking) + 1) + "|"]
-    for extra, wanted in groups.items():
-        names = [Requirement(text).name for text in wanted]
+    for extra, requirements in groups.items():
+        names = [Requirement(text).name for text in requirements]
         cells = []
         for missing in lacking.values():
-            here = [name for name in names if name in missing]
-            cells.append(f"no {', '.join(here)}" if here else "all")
+            lacking_here = [name for name in names if name in missing]
+            cells.append(f"no {', '.join(lacking_here)}" if lacking_here else "all")
         lines.append(f"| {f'`{extra}`' if extra else 'none'} | " + " | ".join(cells) + " |")
     return "\n".join(lines) + "\n"
 
 
 def main(page: Path | None) -> None:
-    """Ask for every system and print the table, or write it between the marks of a page."""
+    """Query every system and print the table, or write it between the marks of a page."""
     groups = dependencies(tomllib.loads((REPO / "pyproject.toml").read_text("utf-8")))
-    wanted = [text for group in groups.values() for text in group]
-    made = table(groups, {s: set(without_wheel(wanted, p)) for s, p in SYSTEMS.items()})
+    requirements = [text for group in groups.values() for text in group]
+    markdown = table(groups, {s: set(without_wheel(requirements, p)) for s, p in SYSTEMS.items()})
     if page is None:
-        print(made, end="")
+        print(markdown, end="")
         return
     before, _, rest = page.read_text("utf-8").partition(_BEGIN)
-    page.write_text(f"{before}{_BEGIN}{made}{_END}{rest.partition(_END)[2]}", "utf-8")
+    page.write_text(f"{before}{_BEGIN}{markdown}{_END}{rest.partition(_END)[2]}", "utf-8")
 
 
 if __name__ == "__main__":

@@ -1,7 +1,7 @@
-"""With CI=true a test that skips itself has failed: nothing may pass by being left out.
+"""With CI=true a skipped test counts as failed, so that no test passes by being skipped.
 
-Tests that need what a machine may lack have a marker and a make target; they are deselected, not
-skipped.
+Tests with requirements that a machine may lack have a marker and a make target; they are deselected
+rather than skipped.
 """
 
 from __future__ import annotations
@@ -14,7 +14,7 @@ import pytest
 
 
 def fail_skipped(report: Any) -> None:
-    """Turn a report of "skipped" into one of "failed"; expected failures keep theirs."""
+    """Turn a report of "skipped" into "failed", except for expected failures."""
     if os.environ.get("CI") == "true" and report.skipped and not hasattr(report, "wasxfail"):
         report.outcome = "failed"
         report.longrepr = f"skipped, which CI=true forbids: {report.longrepr}"

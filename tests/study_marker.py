@@ -1,4 +1,4 @@
-"""Tests of the marker `study` import torch: where they are deselected they are not even imported."""
+"""Tests of the marker `study` import torch: if deselected they are not even imported."""
 
 from __future__ import annotations
 
@@ -9,9 +9,9 @@ import pytest
 
 
 def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
-    """Leave out a file of the marker where -m says "not study", so that torch may be missing.
+    """Ignore a file of the marker if -m says "not study", so that torch may be missing.
 
-    Where it is missing, a marker that does not name study (chaos, slow) leaves them out as well.
+    If torch is missing, a marker expression without study (chaos, slow) ignores them as well.
     """
     markers = config.getoption("markexpr")
     asks_for_others = bool(markers) and "study" not in markers

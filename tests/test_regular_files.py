@@ -1,4 +1,4 @@
-"""What is no regular file, or no small one, is never read."""
+"""Irregular and huge files are never read."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def _sparse(path: Path) -> None:
 
 
 @pytest.mark.parametrize("make", [_device, os.mkfifo, Path.mkdir, _sparse])
-def test_devices_pipes_folders_and_endless_files_are_refused_at_once(make, tmp_path):
+def test_devices_pipes_folders_and_endless_files_are_refused_immediately(make, tmp_path):
     path = tmp_path / "bad.sh3d"
     make(path)
     for read in (read_regular, digest_of_regular):
@@ -40,7 +40,7 @@ def test_devices_pipes_folders_and_endless_files_are_refused_at_once(make, tmp_p
         assert fault_of(caught.value).startswith("cannot be read: ")
 
 
-def test_a_regular_file_is_read_whole_and_a_longer_one_is_not(tmp_path):
+def test_a_regular_file_is_read_completely_and_a_longer_one_is_not(tmp_path):
     path = tmp_path / "home"
     path.write_bytes(b"1234")
     assert read_regular(path, 4) == b"1234"
@@ -64,7 +64,7 @@ def test_text_of_any_system_is_read_without_its_byte_order_mark(encoding, tmp_pa
     assert text_given(path) == "Küche\n"
 
 
-def test_text_that_is_damaged_is_read_as_far_as_it_goes_where_that_is_wanted():
+def test_damaged_text_is_read_in_part_on_request():
     assert text_from_bytes(b"a\xffb", "replace") == "a\ufffdb"
     with pytest.raises(UnicodeDecodeError):
         text_from_bytes(b"a\xffb")

@@ -137,14 +137,14 @@ def slot() -> float:
 def large_home(n_faces: int = LARGE_FACES) -> dict[str, Any]:
     """The memory of a home of about so many triangles (between half and twice as many)."""
     house, recipe = _home("fast")
-    while 2 * _n_faces(house) < n_faces:  # a split makes four of each
-        house = _split(house)
+    while 2 * count_faces(house) < n_faces:  # a split makes four of each
+        house = split_triangles(house)
     before, began = _used_mb(), time.monotonic()
     scene = LightScene.load(house, {}, recipe, sky_for_house(recipe, house.id))
     fields = recipe.light.model_copy(update={"spp": 4, "denoise": False})
     _render(scene, _camera(house), fields, recipe, 1)
     return {
-        "gpu.large_home_faces": _n_faces(house),
+        "gpu.large_home_faces": count_faces(house),
         "gpu.large_home_s": round(time.monotonic() - began, 1),
         "gpu.large_home_mb": round(_used_mb() - before),
     }
@@ -240,11 +240,11 @@ def _ms(work: Callable[[], object], n: int) -> float:
     return round(1e3 * (time.perf_counter() - began) / n, 1)
 
 
-def _n_faces(house: House) -> int:
+def count_faces(house: House) -> int:
     return sum(len(surface.faces) for item in house.items for surface in item.surfaces)
 
 
-def _split(house: House) -> House:
+def split_triangles(house: House) -> House:
     """The same home, each triangle split at the middles of its edges into four."""
     items = [
         replace(item, surfaces=tuple(_split_surface(s) for s in item.surfaces))

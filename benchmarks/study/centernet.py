@@ -109,14 +109,14 @@ def _maps(picture: NDArray[np.float32]) -> tuple[Tensor, Tensor]:
                 weights[source] if source in weights else value(source)
                 for source in node.get("input", ())
             ]
-            values[name] = _run(node["op"], inputs, node.get("attr", {}))
+            values[name] = run_node(node["op"], inputs, node.get("attr", {}))
         return values[name]
 
     with torch.no_grad():
         return value("tower_0/keypoints"), value("tower_0/wh")
 
 
-def _run(op: str, inputs: list[Tensor], attributes: dict[str, Any]) -> Tensor:
+def run_node(op: str, inputs: list[Tensor], attributes: dict[str, Any]) -> Tensor:
     """Result of a node; pictures are (B, C, H, W), constants as stored."""
     x = inputs[0]
     if op in ("_FusedConv2D", "Conv2D", "FusedDepthwiseConv2dNative", "DepthwiseConv2dNative"):

@@ -90,7 +90,7 @@ def _download_into(package: str, tested_version: str, folder: Path) -> Deb:
     folder.mkdir(parents=True, exist_ok=True)
     # Download beside the cache, then move: a package is there whole or not at all.
     with tempfile.TemporaryDirectory(dir=folder) as scratch:
-        _fetch(package, tested_version, Path(scratch))
+        fetch_deb(package, tested_version, Path(scratch))
         debs = sorted(Path(scratch).glob(f"{package}_*.deb"))
         if not debs:
             raise MachineFailed(f"apt-get downloaded no {package}", hint=_HINT)
@@ -99,7 +99,7 @@ def _download_into(package: str, tested_version: str, folder: Path) -> Deb:
     return _deb(package, tested_version, target)
 
 
-def _fetch(package: str, tested_version: str, scratch: Path) -> None:
+def fetch_deb(package: str, tested_version: str, scratch: Path) -> None:
     """Through apt; where apt is missing, or refuses as it does without its lists, the pinned file."""
     has_apt = shutil.which("apt-get") is not None
     if not has_apt and package not in PINS:
@@ -124,11 +124,13 @@ def _deb(package: str, tested_version: str, path: Path) -> Deb:
     status, version, note = path.stat(), version_of(path), ""
     if version != tested_version:
         note = f"{package} {version} is not the tested version {tested_version}"
-    return Deb(package, version, path, _sha256(path, status.st_size, status.st_mtime_ns), note)
+    return Deb(
+        package, version, path, cached_sha256(path, status.st_size, status.st_mtime_ns), note
+    )
 
 
 @lru_cache(maxsize=16)
-def _sha256(path: Path, size: int, mtime_ns: int) -> str:
+def cached_sha256(path: Path, size: int, mtime_ns: int) -> str:
     # Keep the hash beside the file, under its size and date: a hundred megabytes take a while.
     note, cached = path.with_name(f"{path.name}.sha256"), [""]
     with contextlib.suppress(OSError):

@@ -116,7 +116,7 @@ class _Bulb:
 
 
 @dataclass(frozen=True, slots=True, eq=False)
-class _Places:
+class LitPlaces:
     """N windows amid surfaces."""
 
     rows: I64
@@ -171,7 +171,7 @@ def _to_sun(case: ViewCase) -> F64 | None:
     return np.array(sky["sun_direction"], np.float64)
 
 
-def _places(case: ViewCase) -> _Places:
+def _places(case: ViewCase) -> LitPlaces:
     """Windows that show one instance with one normal, of a surface that scatters light."""
     view, (triangles, rays), n = case.view, case.scene, _WINDOW_PX
     albedo = luminance_of(case.light, "albedo")
@@ -197,14 +197,14 @@ def _places(case: ViewCase) -> _Places:
     corners = np.stack(points, axis=1)
     painted = (1 - COAT) * (1 - COAT / np.maximum(albedo[rows, columns], COAT))
     towards = cast.directions / np.linalg.norm(cast.directions, axis=1, keepdims=True)
-    return _Places(
+    return LitPlaces(
         rows, columns, corners[:, 0], normal, corners,
         np.where(coated_materials(case.house)[triangles.material[face]], painted, 1.0),
         -dot(normal, towards),
     )  # fmt: skip
 
 
-def _lux(case: ViewCase, name: str, places: _Places) -> F64:
+def _lux(case: ViewCase, name: str, places: LitPlaces) -> F64:
     """(N,) lx that arrive in windows: mean radiance over albedo."""
     albedo = np.maximum(luminance_of(case.light, "albedo"), _LEAST_ALBEDO)
     share = luminance_of(case.light, name) / albedo
@@ -212,7 +212,7 @@ def _lux(case: ViewCase, name: str, places: _Places) -> F64:
     return np.asarray(mean[places.rows, places.columns] * math.pi * LM_PER_W)
 
 
-def _check_sun(case: ViewCase, places: _Places) -> None:
+def _check_sun(case: ViewCase, places: LitPlaces) -> None:
     """Places that see all of the sun have its light, and places that see none of it have less."""
     to_sun, scene = _to_sun(case), case.now.shared(LitScene)
     if to_sun is None:
@@ -257,7 +257,7 @@ def _around(direction: F64) -> Iterator[F64]:
         yield direction + _SUN_RAD * (a * side + b * up)
 
 
-def _check_bulbs(case: ViewCase, places: _Places) -> None:
+def _check_bulbs(case: ViewCase, places: LitPlaces) -> None:
     """Places that see a bulb have its light."""
     rows = case.view.table.get("modes", {}).get("light", {}).get("lamps") or []
     layers = {row["item"]: row["layer"] for row in rows}
@@ -273,7 +273,7 @@ def _check_bulbs(case: ViewCase, places: _Places) -> None:
         _expect_lit(case, "all lamps", "indoor", places, total)
 
 
-def _direct_lux(case: ViewCase, places: _Places, bulb: _Bulb) -> F64:
+def _direct_lux(case: ViewCase, places: LitPlaces, bulb: _Bulb) -> F64:
     """(N,) lx of direct light of a round bulb, 0 where it is not wholly visible."""
     scene, corners = case.now.shared(LitScene), bulb.corners
     middle = (corners.min(0) + corners.max(0)) / 2
@@ -290,7 +290,7 @@ def _direct_lux(case: ViewCase, places: _Places, bulb: _Bulb) -> F64:
     return np.where(free, lux, 0.0)
 
 
-def _expect_lit(case: ViewCase, name: str, layer: str, places: _Places, direct: F64) -> None:
+def _expect_lit(case: ViewCase, name: str, layer: str, places: LitPlaces, direct: F64) -> None:
     lit = direct >= _LEAST_LX
     right = _lux(case, layer, places)[lit] >= _LAMP * direct[lit]
     _expect_share(case, "lamplight", f"lit by {name}", right)
@@ -307,7 +307,7 @@ def _sun_on_floor(case: ViewCase, room: Mapping[str, Any]) -> float:
     return float(_sky(case)["sun_lx"]) if free.any() else 0.0
 
 
-def _check_level(case: ViewCase, places: _Places) -> None:
+def _check_level(case: ViewCase, places: LitPlaces) -> None:
     """The visible floor is about as bright as the room's in illuminance.json."""
     house, name = case.house, str(case.view.table.get("room"))
     room, row = house.rooms.get(name, {}), house.lux_rows.get(name)
@@ -386,7 +386,7 @@ def _check_windows(case: ViewCase) -> None:
     case.expect("windows", "radiance.exr")(day > lamps, fault)
 
 
-def _check_colours(case: ViewCase, places: _Places) -> None:
+def _check_colours(case: ViewCase, places: LitPlaces) -> None:
     """By day, lamps whose sources name no colour are redder than daylight."""
     lights = [light for row in case.house.items.values() for light in row["lights"]]
     emission = case.house.recipe.get("emission", {})
@@ -401,7 +401,7 @@ def _check_colours(case: ViewCase, places: _Places) -> None:
         case.expect("colours of light", "radiance.exr")(indoor > outdoor, fault)
 
 
-def _red_over_blue(case: ViewCase, places: _Places, group: str) -> float:
+def _red_over_blue(case: ViewCase, places: LitPlaces, group: str) -> float:
     """Ratio of a light group's arriving red to its blue."""
     means = []
     for c in "RB":

@@ -97,14 +97,14 @@ def _run(args: argparse.Namespace) -> int:
         raise BadInput("run", "", "no home given", hint=hint)
     if args.out is not None:
         return run_homes(args, homes)
-    args.out = _folder_of(homes[0])
+    args.out = default_output(homes[0])
     code = run_homes(args, homes)
     if code == 0 and not args.json:
         echo(f"output in {args.out}; next: pbrs-farm sheet {args.out}")
     return code
 
 
-def _folder_of(home: str) -> str:
+def default_output(home: str) -> str:
     """Default output folder of a run: out/ and the home's name in lower case."""
     name = Path(home.partition(":")[0] if is_made(home) else home).stem
     plain = "".join(c if c.isalnum() or c in "-_" else "-" for c in name.lower()).strip("-")
@@ -151,7 +151,7 @@ def run_and_report(
                 observe(event)
 
         summary = run_local(run, hear)
-    _report(summary, time.monotonic() - started, run.store_url, as_json=as_json)
+    print_summary(summary, time.monotonic() - started, run.store_url, as_json=as_json)
     return summary
 
 
@@ -205,7 +205,7 @@ def _warn_of_slowness() -> None:
         )
 
 
-def _report(summary: Summary, seconds: float, out: str, *, as_json: bool) -> None:
+def print_summary(summary: Summary, seconds: float, out: str, *, as_json: bool) -> None:
     if as_json:
         echo(_summary_line(summary, seconds))
         return

@@ -98,7 +98,7 @@ def dressed_house(
     bank = PaintedBank(catalogue.painted_folder)
     with closing(MutableHouse(house, seed, fields.mess, bank, fields.library_share)) as mutable:
         return Dressed(
-            *_dressed(mutable, catalogue, fields, on_progress), mutable.used, len(house.items)
+            *dress_in_place(mutable, catalogue, fields, on_progress), mutable.used, len(house.items)
         )
 
 
@@ -118,7 +118,7 @@ def refit_after_repair(repaired: House, dressed: Dressed, catalogue: Catalogue) 
     return dressed._replace(house=house, report=report.model_copy(update=update))
 
 
-def _dressed(
+def dress_in_place(
     house: MutableHouse,
     catalogue: Catalogue,
     fields: DressFields,

@@ -61,12 +61,12 @@ class WantedKind(Record):
     beside: Nyu40 | None = None  # placed next to an item of that class
 
 
-class _Furniture(Record):
+class FurnitureTable(Record):
     kinds: dict[str, WantedKind]
     wanted: dict[RoomKind, tuple[tuple[str, float], ...]]
 
     @model_validator(mode="after")
-    def _rooms_want_what_there_is(self) -> _Furniture:
+    def _rooms_want_what_there_is(self) -> FurnitureTable:
         names = {*self.kinds}
         for room, wishes in self.wanted.items():
             if unknown := {name for name, _chance in wishes} - names:
@@ -74,7 +74,7 @@ class _Furniture(Record):
         return self
 
 
-_FILE: Final = read_toml(Path(__file__).with_name("furniture.toml"), _Furniture)
+_FILE: Final = read_toml(Path(__file__).with_name("furniture.toml"), FurnitureTable)
 KINDS: Final[Mapping[str, WantedKind]] = _FILE.kinds
 WANTED: Final[Mapping[RoomKind, tuple[tuple[str, float], ...]]] = _FILE.wanted
 
@@ -138,7 +138,9 @@ def _stand_at_wall(
         if w > floor.wall_m:
             continue
         share = house.own_share
-        model = _from_catalogue(catalogue, kind, w, piece_seed, share) if from_catalogue else None
+        model = (
+            model_from_catalogue(catalogue, kind, w, piece_seed, share) if from_catalogue else None
+        )
         model = model or _generated(kind, look, (w, height, depth), piece_seed)
         spot = _find_spot(house, floor, kind, model, rng)
         if spot is None:
@@ -157,7 +159,7 @@ def _generated(
     return grained(content().things[kind.model](rng, look.style, look.boards, size), look)
 
 
-def _from_catalogue(
+def model_from_catalogue(
     catalogue: Catalogue, kind: WantedKind, width: float, seed: int, own_share: float
 ) -> Model | None:
     """A model of about that width; None if there is none."""

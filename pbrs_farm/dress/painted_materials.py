@@ -79,15 +79,15 @@ class PaintedMaterials(Sequence[Material]):
     def paint(self, paint: Callable[[], Painted]) -> tuple[int, Painting]:
         """The number of a new material and its painting, which a thread begins after the others."""
         painting = Painting(paint)
-        self._thread.submit(painting.painted)
+        self.painter.submit(painting.painted)
         self._textures.append(painting)
         self._all.append(painting)
         return len(self._all) - 1, painting
 
     def close(self) -> None:
         """Stop the thread after its current task."""
-        if "_thread" in self.__dict__:
-            self._thread.shutdown(wait=False, cancel_futures=True)
+        if "painter" in self.__dict__:
+            self.painter.shutdown(wait=False, cancel_futures=True)
 
     def textures(self) -> dict[str, Texture]:
         """All textures by id, in the order of addition; waits for unfinished ones."""
@@ -100,5 +100,5 @@ class PaintedMaterials(Sequence[Material]):
         return textures
 
     @cached_property
-    def _thread(self) -> ThreadPoolExecutor:
+    def painter(self) -> ThreadPoolExecutor:
         return ThreadPoolExecutor(1, "paint")

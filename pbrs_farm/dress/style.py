@@ -128,7 +128,7 @@ class WallCover(Record):
     low_m: tuple[float, ...] = ()  # heights of a foot for variants without one
 
 
-class _Styles(Record):
+class StyleTable(Record):
     # The file style.toml.
     woods_for: _WoodsFor
     covers: dict[str, WallCover]
@@ -138,7 +138,7 @@ class _Styles(Record):
     tastes: tuple[_Taste, ...]
 
     @model_validator(mode="after")
-    def _tastes_know_their_woods(self) -> _Styles:
+    def _tastes_know_their_woods(self) -> StyleTable:
         valid = {w.name for w in self.woods} | {m.name for m in self.metals}
         used = {name for names in self.woods_for.model_dump().values() for name in names}
         if unknown := used - {w.name for w in self.woods}:
@@ -151,7 +151,7 @@ class _Styles(Record):
         return self
 
 
-_FILE: Final = read_toml(Path(__file__).with_name("style.toml"), _Styles)
+_FILE: Final = read_toml(Path(__file__).with_name("style.toml"), StyleTable)
 WOODS: Final = {wood.name: wood for wood in _FILE.woods}
 METALS: Final = {metal.name: metal for metal in _FILE.metals}
 WOODS_FOR: Final = _FILE.woods_for

@@ -50,8 +50,8 @@ class GlbWriter:
 
     def __init__(self) -> None:
         self._binary = bytearray()  # the one buffer
-        self._views: list[dict[str, int]] = []  # parts of it
-        self._accessors: list[dict[str, Any]] = []  # a view each, with type and count
+        self.views: list[dict[str, int]] = []  # parts of it
+        self.accessors: list[dict[str, Any]] = []  # a view each, with type and count
 
     def add_bytes(self, data: bytes, *, target: int | None = None) -> int:
         """Index of a new buffer view that holds data.
@@ -64,8 +64,8 @@ class GlbWriter:
         if target is not None:
             view["target"] = target
         self._binary += data + b"\0" * (-len(data) % 4)
-        self._views.append(view)
-        return len(self._views) - 1
+        self.views.append(view)
+        return len(self.views) - 1
 
     def add_vertices(self, array: F32, *, with_bounds: bool = False) -> int:
         """Index of a new accessor over array (N, 2 or 3) float32, N >= 1.
@@ -83,8 +83,8 @@ class GlbWriter:
         if with_bounds:
             accessor["min"] = array.min(0).tolist()
             accessor["max"] = array.max(0).tolist()
-        self._accessors.append(accessor)
-        return len(self._accessors) - 1
+        self.accessors.append(accessor)
+        return len(self.accessors) - 1
 
     def add_faces(self, faces: I32) -> int:
         """Index of a new accessor over the vertex numbers of faces (F, 3), F >= 1.
@@ -92,7 +92,7 @@ class GlbWriter:
         faces: int32, vertex numbers from 0, written as 32-bit unsigned ones; they are not checked
         against the vertices.
         """
-        self._accessors.append(
+        self.accessors.append(
             {
                 "bufferView": self.add_bytes(_little(faces, "<u4"), target=_ELEMENT_ARRAY_BUFFER),
                 "componentType": _UINT,
@@ -100,7 +100,7 @@ class GlbWriter:
                 "type": "SCALAR",
             }
         )
-        return len(self._accessors) - 1
+        return len(self.accessors) - 1
 
     def glb(self, document: dict[str, Any]) -> bytes:
         """The file: document (without empty lists, as glTF requires) with buffers, and the binary.
@@ -125,8 +125,8 @@ class GlbWriter:
     def _whole(self, document: dict[str, Any]) -> dict[str, Any]:
         document = {
             **document,
-            "accessors": self._accessors,
-            "bufferViews": self._views,
+            "accessors": self.accessors,
+            "bufferViews": self.views,
             "buffers": [{"byteLength": len(self._binary)}] if self._binary else [],
         }
         return {k: v for k, v in document.items() if v != []}

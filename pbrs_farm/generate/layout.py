@@ -65,7 +65,7 @@ def layout(programme: Programme, rng: np.random.Generator, *, is_fixed: bool = F
     with the nearest programme that has one.
     """
     size_text = f"{len(programme.rooms)} rooms in {programme.area:.0f} m2"
-    for left_out, tried in _easier(programme):
+    for left_out, tried in easier_programmes(programme):
         n_tries = N_TRIES * (_FIXED_TRIES if is_fixed else 1)
         solution = _solved_layout(tried, rng, is_fixed=is_fixed, n_tries=n_tries)
         if solution is None:
@@ -83,7 +83,7 @@ def layout(programme: Programme, rng: np.random.Generator, *, is_fixed: bool = F
     )
 
 
-def _easier(programme: Programme) -> list[tuple[str, Programme]]:
+def easier_programmes(programme: Programme) -> list[tuple[str, Programme]]:
     """(what was dropped, remaining programme), starting with the programme itself."""
     steps = [("", programme)]
     for left_out, change in (

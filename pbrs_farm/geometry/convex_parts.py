@@ -314,13 +314,15 @@ def convex_parts(triangles: F64, *, most: int = 24, threshold: float = 0.05) -> 
     mesh = coacd.Mesh(vertices, faces.reshape(-1, 3).astype(np.int32))
     result = coacd.run_coacd(mesh, threshold=threshold, max_convex_hull=most, seed=1)
     # CoACD works on a grown mesh, by a hundredth of its size: what rests on such parts hovers.
-    parts_within = (_within(np.asarray(part, np.float64), points) for part, _faces in result)
+    parts_within = (
+        clamped_to_hull(np.asarray(part, np.float64), points) for part, _faces in result
+    )
     hulls = (hull_of(part) for part in parts_within)
     parts = tuple(hull for hull in hulls if hull is not None)
     return parts or ((whole,) if whole is not None else (thickened(points),))
 
 
-def _within(points: F64, body: F64) -> F64:
+def clamped_to_hull(points: F64, body: F64) -> F64:
     """points (N, 3), those beyond the convex hull of body (M, 3) moved onto it."""
     try:
         planes = ConvexHull(body).equations

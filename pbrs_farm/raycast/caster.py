@@ -54,7 +54,7 @@ class Caster:
 
     def _begin(self, hittable: Bools, still: _StillFaces | None = None) -> None:
         self._hittable, self._still = hittable, still
-        self._tracer = self._tracer_of(hittable)
+        self.tracer = self._tracer_of(hittable)
         self._without: tuple[bytes, RayTracer | None] = (b"", None)  # skipped faces, their tracer
 
     @classmethod
@@ -86,12 +86,12 @@ class Caster:
 
         skip_faces: (F,) bool, faces to ignore: the transparent ones give the hit behind glass.
         """
-        tracer = self._tracer if skip_faces is None else self._tracer_without(skip_faces)
+        tracer = self.tracer if skip_faces is None else self._tracer_without(skip_faces)
         return hit_record_from_faces(self.geometry, camera, _faces_of_surface(tracer, camera))
 
     def item_buffer(self, camera: Camera) -> ItemBuffer:
         """(H, W) uint32 instance id of the first hit at each pixel's centre, glass too; 0 = nothing."""
-        face = _faces_of_surface(self._tracer, camera)
+        face = _faces_of_surface(self.tracer, camera)
         if not len(self.geometry.face_item):
             return np.zeros(face.shape, np.uint32)
         # Read the item of each face; a ray that misses sees item 0.
@@ -103,13 +103,13 @@ class Caster:
         Cameras may differ in size; memory is bounded. At edges single pixels may differ from item_buffer
         (see JitTracer).
         """
-        if self._tracer is None or not cameras:
+        if self.tracer is None or not cameras:
             counts = np.zeros((len(cameras), self.n_items + 1), np.uint32)
             for row, camera in enumerate(cameras):
                 # Without a face every ray misses.
                 counts[row, 0] = camera.intrinsics.width_px * camera.intrinsics.height_px
             return counts
-        return self._tracer.counts(cameras, self.geometry.face_item, self.n_items + 1)
+        return self.tracer.counts(cameras, self.geometry.face_item, self.n_items + 1)
 
     def depth_pictures(self, cameras: Sequence[Camera]) -> F32:
         """(N, H, W) depth_z in metres at the pixels' centres, 0 = nothing.
@@ -146,12 +146,12 @@ class Caster:
         is a unit vector. A ray that starts on a surface may hit it at 0: start a little off it.
         """
         n = len(origins)
-        if self._tracer is None or n == 0:
+        if self.tracer is None or n == 0:
             return np.full(n, np.inf, np.float32), np.full(n, -1, np.int32)
         # Trace in float32, as Mitsuba's single-precision variants do.
         rays = np.asarray(origins, np.float32), np.asarray(directions, np.float32)
         reach = np.broadcast_to(np.asarray(max_distance, np.float32), (n,))
-        return self._tracer.first_hit(*rays, reach)
+        return self.tracer.first_hit(*rays, reach)
 
     def _tracer_without(self, skip_faces: Bools) -> RayTracer | None:
         if skip_faces.shape != (len(self.geometry.faces),):

@@ -53,10 +53,10 @@ class NearestTracer:
     """
 
     def __init__(self, first: RayTracer, second: RayTracer) -> None:
-        self._first, self._second = first, second
+        self.first, self.second = first, second
 
     def faces_of_camera(self, camera: Camera) -> I32:
-        face, second_face = (t.faces_of_camera(camera) for t in (self._first, self._second))
+        face, second_face = (t.faces_of_camera(camera) for t in (self.first, self.second))
         nearest = np.where(face >= 0, face, second_face)
         both_hit = np.flatnonzero((face >= 0) & (second_face >= 0))
         if len(both_hit):
@@ -68,8 +68,8 @@ class NearestTracer:
         return nearest
 
     def first_hit(self, origins: F32, directions: F32, max_distance: F32) -> tuple[F32, I32]:
-        t, face = self._first.first_hit(origins, directions, max_distance)
-        other_t, second_face = self._second.first_hit(origins, directions, max_distance)
+        t, face = self.first.first_hit(origins, directions, max_distance)
+        other_t, second_face = self.second.first_hit(origins, directions, max_distance)
         is_nearer = other_t < t
         return np.where(is_nearer, other_t, t), np.where(is_nearer, second_face, face)
 

@@ -40,7 +40,7 @@ _UNNAMED: Final = (MIN_LLVM,)  # what a library without a version in its name co
 _BESIDE_LLVM: Final = ("libunwind.so.1.0", "libc++abi.so.1.0", "libc++.so.1.0")
 
 
-def _module(name: str) -> Any:
+def import_renderer(name: str) -> Any:
     """Mitsuba or Dr.Jit, imported by name; raises MachineFailed where it is not installed."""
     try:
         return importlib.import_module(name)
@@ -126,7 +126,7 @@ def choose_variant() -> str:
     variant works.
     """
     library = name_libraries()
-    dr = _module("drjit")
+    dr = import_renderer("drjit")
     # Prefer the GPU, then LLVM, then Mitsuba without Dr.Jit's arrays.
     if dr.has_backend(dr.JitBackend.CUDA) and works("cuda_ad_rgb"):
         return "cuda_ad_rgb"
@@ -143,7 +143,7 @@ def mitsuba(variant: str | None = None) -> Any:
     Raises MachineFailed when the variant cannot be loaded here.
     """
     name = choose_variant() if variant is None else variant
-    module = _module("mitsuba")
+    module = import_renderer("mitsuba")
     if module.variant() != name:
         module.set_variant(name)
     return module
@@ -159,7 +159,7 @@ def llvm_of_variant(variant: str) -> str:
     """The version of LLVM that compiles a variant's kernels, such as "19.1.7"; "" where none does."""
     if not variant.startswith("llvm"):
         return ""
-    return ".".join(map(str, _module("drjit").detail.llvm_version()))
+    return ".".join(map(str, import_renderer("drjit").detail.llvm_version()))
 
 
 def _has_good_llvm(dr: Any) -> bool:

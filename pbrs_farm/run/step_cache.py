@@ -92,7 +92,7 @@ def run_unless_done(
     inputs = _inputs(step, work)
 
     def digest_of(work: Work) -> str:
-        extra = _extra(name, work)
+        extra = extra_inputs(name, work)
         return plan.step_digest(step, work.recipe, work.house_id, view_id, inputs, extra)
 
     key = keys.marker_key(work.house_id, name, view_id)
@@ -166,7 +166,7 @@ def _inputs(step: plan.Step, work: Work) -> dict[str, str]:
     return digests
 
 
-def _extra(name: str, work: Work) -> object:
+def extra_inputs(name: str, work: Work) -> object:
     """Inputs of a step beside recipe fields and other steps."""
     if name == "house":
         return passes.step_depends(required_source(work), work.recipe)

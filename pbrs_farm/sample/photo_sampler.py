@@ -79,7 +79,7 @@ class PhotoSampler:
         none = np.zeros(n)
         placed = RoomCandidates(room, candidates, verdict, none, nothing, none, none)
         remaining = np.flatnonzero(verdict == Verdict.LOWER_SCORE)
-        return self._scored(placed, remaining, *self._first_sizes)
+        return self.scored_from_pictures(placed, remaining, *self._first_sizes)
 
     def with_better_scores(self, rooms: Sequence[RoomCandidates]) -> list[RoomCandidates]:
         """Score the eligible candidates of all rooms again from small pictures; others lose their score."""
@@ -87,9 +87,12 @@ class PhotoSampler:
             return list(rooms)
         first = [replace(scored, verdict=scored.verdict.copy()) for scored in rooms]
         likely = PhotoChoice(self.fields, self._intrinsics(*DEPTH_SIZE), None).likely(first)
-        return [self._scored(scored, likely[scored.room.id], *self._sizes) for scored in first]
+        return [
+            self.scored_from_pictures(scored, likely[scored.room.id], *self._sizes)
+            for scored in first
+        ]
 
-    def _scored(
+    def scored_from_pictures(
         self, placed: RoomCandidates, which: NDArray[np.intp], size: Size, depth_size: Size
     ) -> RoomCandidates:
         """The candidates numbered by which (M,) with scores from pictures of a size; no other has one."""

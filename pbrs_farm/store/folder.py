@@ -59,7 +59,7 @@ class FolderStore:
                 raise
             self._flush_folder(path.parent)
         except OSError as error:
-            raise self._failure(key, error) from error
+            raise self.failure(key, error) from error
 
     def put_if_absent(self, key: str, data: bytes) -> bool:
         path = self._path(key)
@@ -77,7 +77,7 @@ class FolderStore:
                 _unlink(temporary)
             self._flush_folder(path.parent)
         except OSError as error:
-            raise self._failure(key, error) from error
+            raise self.failure(key, error) from error
         return True
 
     def get(self, key: str) -> bytes:
@@ -86,7 +86,7 @@ class FolderStore:
         except (FileNotFoundError, NotADirectoryError, IsADirectoryError):
             raise ObjectMissing(key, f"no such object in {self.root}") from None
         except OSError as error:
-            raise self._failure(key, error) from error
+            raise self.failure(key, error) from error
 
     def get_range(self, key: str, start: int, n_bytes: int) -> bytes:
         try:
@@ -96,7 +96,7 @@ class FolderStore:
         except (FileNotFoundError, NotADirectoryError, IsADirectoryError):
             raise ObjectMissing(key, f"no such object in {self.root}") from None
         except OSError as error:
-            raise self._failure(key, error) from error
+            raise self.failure(key, error) from error
 
     def head(self, key: str) -> Head | None:
         path = self._path(key)
@@ -106,7 +106,7 @@ class FolderStore:
             status = path.stat()
             return Head(n_bytes=status.st_size, modified_s=status.st_mtime)
         except OSError as error:
-            raise self._failure(key, error) from error
+            raise self.failure(key, error) from error
 
     def list(self, prefix: str = "") -> Iterator[str]:
         check_prefix(prefix)
@@ -118,7 +118,7 @@ class FolderStore:
         except (FileNotFoundError, NotADirectoryError):
             return
         except OSError as error:
-            raise self._failure(key, error) from error
+            raise self.failure(key, error) from error
 
     def sweep(self, older_than_s: float = 24 * 3600.0) -> int:
         """Remove files of killed writers older than older_than_s; returns their number.
@@ -169,7 +169,7 @@ class FolderStore:
         except (FileNotFoundError, NotADirectoryError):
             return  # no such folder: no objects
         except OSError as error:
-            raise self._failure(prefix, error) from error
+            raise self.failure(prefix, error) from error
         for entry in ordered:
             if entry.name.startswith("."):
                 continue  # unfinished or foreign
@@ -178,7 +178,7 @@ class FolderStore:
             else:
                 yield prefix + entry.name
 
-    def _failure(self, key: str, error: OSError) -> StoreFailed:
+    def failure(self, key: str, error: OSError) -> StoreFailed:
         code = error.errno
         # Classify by the caller's remedy: wait, ask for permission, give up.
         reason = error.strerror or str(error)

@@ -90,7 +90,7 @@ class S3Store:
         self._settings = settings
         self._retry_timeout_s = settings.retry_timeout_s
         self._obstore: Any = obstore
-        self._client: Any = Client(bucket, **_client_options(self._prefix, settings))
+        self.client: Any = Client(bucket, **_client_options(self._prefix, settings))
 
     def __reduce__(self) -> tuple[object, ...]:
         # A spawned process makes a new client.
@@ -109,23 +109,23 @@ class S3Store:
                 self._put(key, data, "create")
             except self._obstore.exceptions.AlreadyExistsError:
                 # An earlier try may have succeeded although its response was lost.
-                return n_tries > 0 and bytes(self._obstore.get(self._client, key).bytes()) == data
+                return n_tries > 0 and bytes(self._obstore.get(self.client, key).bytes()) == data
             return True
 
         return self._call(key, create)
 
     def get(self, key: str) -> bytes:
-        return self._call(key, lambda _tries: bytes(self._obstore.get(self._client, key).bytes()))
+        return self._call(key, lambda _tries: bytes(self._obstore.get(self.client, key).bytes()))
 
     def get_range(self, key: str, start: int, n_bytes: int) -> bytes:
         def part(_tries: int) -> bytes:
-            return bytes(self._obstore.get_range(self._client, key, start=start, length=n_bytes))
+            return bytes(self._obstore.get_range(self.client, key, start=start, length=n_bytes))
 
         return self._call(key, part)
 
     def head(self, key: str) -> Head | None:
         try:
-            meta = self._call(key, lambda _tries: self._obstore.head(self._client, key))
+            meta = self._call(key, lambda _tries: self._obstore.head(self.client, key))
         except ObjectMissing:
             return None
         return Head(n_bytes=int(meta["size"]), modified_s=meta["last_modified"].timestamp())
@@ -136,7 +136,7 @@ class S3Store:
 
     def delete(self, key: str) -> None:
         try:
-            self._call(key, lambda _tries: self._obstore.delete(self._client, key))
+            self._call(key, lambda _tries: self._obstore.delete(self.client, key))
         except ObjectMissing:
             return
 
@@ -144,7 +144,7 @@ class S3Store:
         attributes = {"Content-Type": content_type(key)}
         # A multipart upload would not honour If-None-Match on every gateway (Ceph RGW 16).
         self._obstore.put(
-            self._client, key, data, attributes=attributes, mode=mode, use_multipart=False
+            self.client, key, data, attributes=attributes, mode=mode, use_multipart=False
         )
 
     def _list(self, prefix: str) -> Iterator[str]:
@@ -161,7 +161,7 @@ class S3Store:
         options: dict[str, Any] = {"chunk_size": _LIST_CHUNK} | ({"offset": after} if after else {})
 
         def first_chunk(_tries: int) -> tuple[str, ...]:
-            stream = self._obstore.list(self._client, prefix=prefix.rstrip("/") or None, **options)
+            stream = self._obstore.list(self.client, prefix=prefix.rstrip("/") or None, **options)
             return tuple(str(entry["path"]) for entry in next(iter(stream), ()))
 
         return self._call(prefix.rstrip("/") or "root", first_chunk)

@@ -1,4 +1,4 @@
-"""The package where POSIX is lacking: what each system has a name for stands in operating_system.py alone."""
+"""The package without POSIX: names that differ between systems are only in operating_system.py."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from pbrs_farm.run.processes.child_process import ChildProcess
 child = ChildProcess("tests.run.test_render_process:make_handler", Path("log"))
 while child.receive(60.0) is None:
     pass
-print(child._process.pid, flush=True)
+print(child.process.pid, flush=True)
 os._exit(0)
 """
 _WATCHED = """
@@ -35,36 +35,36 @@ _NAMES = (
 )
 
 
-def _said(done: subprocess.CompletedProcess[str]) -> str:
+def _message(done: subprocess.CompletedProcess[str]) -> str:
     assert done.returncode == 0, done.stderr
     return done.stdout
 
 
 def test_our_modules_lack_the_names() -> None:
-    assert _said(python_without_posix(["-c", _NAMES])) == "False False False\n"
+    assert _message(python_without_posix(["-c", _NAMES])) == "False False False\n"
 
 
-def test_psutil_reports_memory_where_there_is_no_proc() -> None:
+def test_psutil_reports_memory_without_proc() -> None:
     code = "from pbrs_farm.operating_system import *; print(resident_mb(1), tree_mb(1), give_back_memory())"
-    assert _said(python_without_posix(["-c", code], "proc")) == "100.0 100.0 None\n"
+    assert _message(python_without_posix(["-c", code], "proc")) == "100.0 100.0 None\n"
 
 
-def test_no_process_starts_whose_log_could_not_be_moved() -> None:
+def test_no_process_starts_if_its_log_could_not_be_moved() -> None:
     code = (
         "from pbrs_farm import cli; from pbrs_farm.run.processes import early_start, limits; "
         "limits.is_room_for_two = lambda: True; cli._start_early(['demo']); print(early_start.STARTED)"
     )
-    assert _said(python_without_posix(["-c", code])) == "{}\n"
+    assert _message(python_without_posix(["-c", code])) == "{}\n"
 
 
 def test_the_help_is_printed() -> None:
-    assert "pbrs-farm COMMAND --help" in _said(pbrs_farm("--help"))
+    assert "pbrs-farm COMMAND --help" in _message(pbrs_farm("--help"))
 
 
-def test_a_run_makes_its_view_and_goes_on_where_it_stopped(tmp_path: Path) -> None:
+def test_a_run_makes_its_view_and_resumes(tmp_path: Path) -> None:
     words = ["run", "builtin", "--views", "1", "--jobs", "1", "--recipe", "preview"]
     words += ["--modes", "opengl_dl", "--out"]
-    first, again = (_said(pbrs_farm(*words, tmp_path / "out")) for _run in range(2))
+    first, again = (_message(pbrs_farm(*words, tmp_path / "out")) for _run in range(2))
     assert ", 0 already there, 0 failed" in first
     assert ": 0 steps done," in again
     assert list((tmp_path / "out").rglob("depth.png"))
@@ -75,7 +75,7 @@ def test_a_render_process_ends_after_its_parent(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, lacks: str
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    pid = int(_said(python_without_posix(["-c", _ORPHAN], lacks)))
+    pid = int(_message(python_without_posix(["-c", _ORPHAN], lacks)))
     until = time.monotonic() + 60.0
     while is_running(pid) and time.monotonic() < until:
         time.sleep(0.1)
@@ -83,11 +83,11 @@ def test_a_render_process_ends_after_its_parent(
 
 
 def test_a_verb_that_is_killed_costs_a_line_with_file_and_step() -> None:
-    said = _said(python_without_posix(["-c", _WATCHED]))
-    assert said == "a.glb: repair: its process was killed by SIGSEGV\n"
+    lines = _message(python_without_posix(["-c", _WATCHED]))
+    assert lines == "a.glb: repair: its process was killed by SIGSEGV\n"
 
 
-def test_a_pipe_without_a_writer_is_no_file_where_opening_waits(
+def test_a_pipe_without_a_writer_is_no_file_even_if_opening_waits(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     os.mkfifo(tmp_path / "pipe")
@@ -113,7 +113,7 @@ def test_a_drive_is_no_scheme() -> None:
     assert not any(map(has_drive, ("s3://bucket/x", "file:///x", "/x", "out/x", "memory:")))
 
 
-def test_no_other_module_names_what_only_posix_has() -> None:
+def test_no_other_module_names_posix_functions() -> None:
     names = (
         "import resource", "import fcntl", "killpg", "os.fork", "register_at_fork", "os.sysconf", "O_NONBLOCK",
         "O_CLOEXEC", "O_DIRECTORY", "memfd_create", "pass_fds", "start_new_session", "select.select", "SIGKILL", "/proc/",

@@ -1,4 +1,4 @@
-"""Commands of ours in processes whose modules of pbrs_farm lack what only POSIX has (site/sitecustomize.py)."""
+"""Our commands in processes whose modules of pbrs_farm lack POSIX names (site/sitecustomize.py)."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SITE: Final = Path(__file__).parent / "site"
 def python_without_posix(
     words: Sequence[str | Path], lacks: str = "posix"
 ) -> subprocess.CompletedProcess[str]:
-    """A Python with words, and every one it starts, without POSIX; its output is kept.
+    """Run Python, and its child processes, without POSIX; its output is captured.
 
     lacks: "posix" as on Windows, "proc" as on macOS, which has POSIX and no /proc.
     """
@@ -27,5 +27,5 @@ def python_without_posix(
 
 
 def pbrs_farm(*words: str | Path) -> subprocess.CompletedProcess[str]:
-    """A command of pbrs-farm there."""
+    """Run a pbrs-farm command there."""
     return python_without_posix(["-m", "pbrs_farm.cli", *words])

@@ -1,4 +1,4 @@
-"""Without apt a package is its pinned file: the right one, whole, or a line that says what to do."""
+"""Without apt a package is its pinned file: the right one, complete, or an error that explains what to do."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ PIN = Pin(
 
 @pytest.fixture
 def mirror(monkeypatch: pytest.MonkeyPatch) -> Iterator[dict[str, bytes]]:
-    """A mirror of its own, path -> bytes, named in the environment; no apt on the PATH."""
+    """A private mirror, path -> bytes, named in the environment; no apt on the PATH."""
     files: dict[str, bytes] = {}
 
     class Handler(BaseHTTPRequestHandler):
@@ -59,7 +59,7 @@ def test_the_pinned_file_is_fetched_into_the_cache(
     deb = fetched_deb(PIN.package, "1.0", tmp_path)
     assert deb.path == tmp_path / PIN.file_name
     assert (deb.version, deb.sha256, deb.note) == ("1.0", PIN.sha256, "")
-    # The second time nobody is asked.
+    # The second time nothing is requested.
     mirror.clear()
     assert fetched_deb(PIN.package, "1.0", tmp_path).sha256 == PIN.sha256
 
@@ -74,7 +74,9 @@ def test_another_file_is_refused_and_not_kept(
     assert list(tmp_path.iterdir()) == []
 
 
-def test_a_mirror_without_it_says_what_to_do(mirror: dict[str, bytes], tmp_path: Path) -> None:
+def test_a_mirror_without_the_file_explains_what_to_do(
+    mirror: dict[str, bytes], tmp_path: Path
+) -> None:
     assert mirror == {}
     with pytest.raises(MachineFailed, match=r"404.*put it into.*PBRS_DEBIAN_MIRROR"):
         download_pinned(PIN, tmp_path)
@@ -96,31 +98,31 @@ def test_where_apt_has_no_lists_the_pinned_file_is_fetched(
     assert fetched_deb(PIN.package, "1.0", tmp_path).sha256 == PIN.sha256
 
 
-def test_what_is_pinned_is_what_is_tested() -> None:
+def test_the_pinned_packages_are_the_tested_ones() -> None:
     modules = (homes_package, furniture_package, skies, libatomic)
     tested = {m.PACKAGE: m.TESTED_VERSION for m in modules}
     assert {name: version_of(Path(pin.file_name)) for name, pin in PINS.items()} == tested
 
 
-def test_a_package_that_apt_gave_here_is_the_pinned_one() -> None:
+def test_a_package_from_apt_is_the_pinned_one() -> None:
     for name, pin in PINS.items():
         path = debian.cache_folder() / pin.file_name
         if path.exists():
-            assert debian._sha256(path, 0, 0) == pin.sha256, name
+            assert debian.cached_sha256(path, 0, 0) == pin.sha256, name
             assert path.stat().st_size == pin.n_bytes
 
 
-def test_a_package_is_hashed_anew_only_where_it_has_changed(tmp_path: Path) -> None:
+def test_a_package_is_hashed_again_only_if_it_has_changed(tmp_path: Path) -> None:
     deb = tmp_path / "some_1.0_all.deb"
     deb.write_bytes(b"one")
     digest = hashlib.sha256(b"one").hexdigest()
-    assert debian._sha256(deb, 3, 7) == digest
-    debian._sha256.cache_clear()  # another process
+    assert debian.cached_sha256(deb, 3, 7) == digest
+    debian.cached_sha256.cache_clear()  # another process
     deb.write_bytes(b"two")
-    assert debian._sha256(deb, 3, 7) == digest
-    assert debian._sha256(deb, 3, 8) == hashlib.sha256(b"two").hexdigest()
-    # A note that says nothing is written anew.
+    assert debian.cached_sha256(deb, 3, 7) == digest
+    assert debian.cached_sha256(deb, 3, 8) == hashlib.sha256(b"two").hexdigest()
+    # An empty note is rewritten.
     (note,) = tmp_path.glob("*.sha256")
     note.write_bytes(b"\xff\x00")
-    debian._sha256.cache_clear()
-    assert debian._sha256(deb, 3, 8) == hashlib.sha256(b"two").hexdigest()
+    debian.cached_sha256.cache_clear()
+    assert debian.cached_sha256(deb, 3, 8) == hashlib.sha256(b"two").hexdigest()

@@ -1,4 +1,4 @@
-"""libatomic: the system's where there is one, else that of Debian's package, by its own name."""
+"""libatomic: the system's if there is one, else that of Debian's package, by its usual name."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from pbrs_farm.core.errors import MachineFailed
 
 
 def deb_of(folder: Path, name: str, data: bytes) -> Deb:
-    """A package that holds one file."""
+    """A package with one file."""
     tar = io.BytesIO()
     with tarfile.open(fileobj=tar, mode="w") as archive:
         entry = tarfile.TarInfo(f"./usr/lib/x86_64-linux-gnu/{name}")
@@ -28,7 +28,7 @@ def deb_of(folder: Path, name: str, data: bytes) -> Deb:
     return Deb("libatomic1", "1.0", path, "0123456789abcdef0123")
 
 
-def test_the_library_is_unpacked_beside_its_package(tmp_path: Path) -> None:
+def test_the_library_is_unpacked_next_to_its_package(tmp_path: Path) -> None:
     deb = deb_of(tmp_path, "libatomic.so.1.2.0", b"code")
     library = libatomic.unpacked_library(deb)
     assert library == tmp_path / "libatomic1-0123456789abcdef" / "libatomic.so.1"
@@ -42,7 +42,7 @@ def test_a_package_without_the_library_is_damaged(tmp_path: Path) -> None:
         libatomic.unpacked_library(deb_of(tmp_path, "README", b""))
 
 
-def test_the_systems_own_is_taken_and_nothing_fetched(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_systems_library_is_used_and_nothing_fetched(monkeypatch: pytest.MonkeyPatch) -> None:
     loaded = []
     monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.setattr(ctypes, "CDLL", loaded.append)
@@ -69,7 +69,7 @@ def test_a_system_without_it_loads_that_of_the_package(
     assert loaded == [str(libatomic.unpacked_library(deb))]
 
 
-def test_a_file_for_another_processor_is_told(
+def test_a_file_for_another_processor_is_refused(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def refuse(_name: str) -> None:
@@ -83,7 +83,7 @@ def test_a_file_for_another_processor_is_told(
         libatomic.load_libatomic()
 
 
-def test_a_system_without_it_or_a_network_is_told_both_ways_to_get_it(
+def test_without_the_library_or_a_network_the_error_has_both_remedies(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     from pbrs_farm.raycast import variant
@@ -97,8 +97,8 @@ def test_a_system_without_it_or_a_network_is_told_both_ways_to_get_it(
     monkeypatch.setattr("sys.platform", "linux")
     monkeypatch.setattr(ctypes, "CDLL", refuse)
     monkeypatch.setattr("pbrs_farm.assets.debian.fetched_deb", offline)
-    # What cannot be imported tells it, too, instead of the library's own words.
+    # A failed import has the same message instead of the library's.
     expected = r"no libatomic, which Dr\.Jit needs: https://mirror.*libatomic.*; or put x\.deb into"
-    for call in (libatomic.load_libatomic, lambda: variant._module("no_such_drjit")):
+    for call in (libatomic.load_libatomic, lambda: variant.import_renderer("no_such_drjit")):
         with pytest.raises(MachineFailed, match=expected):
             call()

@@ -1,4 +1,4 @@
-"""The file that every bench leaves, out/bench/<name>.json, and the names by which benches are run."""
+"""The file that every bench writes, out/bench/<name>.json, and the names of benches."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The parts of the GPU's bench: what fails costs itself, and the large home is the small one in more triangles."""
+"""Parts of the GPU's bench: a failed part costs only itself, and the large home is the small one in more triangles."""
 
 from __future__ import annotations
 
@@ -22,12 +22,12 @@ def areas(surfaces) -> np.ndarray:
 
 def test_a_split_home_has_four_triangles_for_each_on_the_same_surfaces():
     house = builtin_home()
-    split = gpu._split(house)
-    assert gpu._n_faces(split) == 4 * gpu._n_faces(house)
-    for item, other in zip(house.items, split.items, strict=True):
-        for surface, quarter in zip(item.surfaces, other.surfaces, strict=True):
+    split = gpu.split_triangles(house)
+    assert gpu.count_faces(split) == 4 * gpu.count_faces(house)
+    for item, split_item in zip(house.items, split.items, strict=True):
+        for surface, quarter in zip(item.surfaces, split_item.surfaces, strict=True):
             before, after = areas([surface]), areas([quarter]).reshape(-1, 4)
-            # Each triangle is four of a quarter of its area, turned as it is.
+            # Each triangle becomes four of a quarter of its area, with its orientation.
             np.testing.assert_allclose(after, np.tile(before[:, None] / 4, 4), rtol=1e-2, atol=1e-7)
             assert (quarter.uvs is None) == (surface.uvs is None)
 
@@ -43,7 +43,7 @@ def test_a_part_that_fails_leaves_its_figures_out_and_the_others_measured(
     with pytest.raises(SystemExit, match="failed: a"):
         gpu.main()
     assert "a failed: RuntimeError: no card" in capsys.readouterr().err
-    found = json.loads((tmp_path / "gpu.json").read_text())["figures"]
-    assert found["gpu.denoise_ms"] == 3.0
-    assert found["gpu.opengl_ms"] == -1
-    assert set(found) == set(gpu.UNITS)
+    stored = json.loads((tmp_path / "gpu.json").read_text())["figures"]
+    assert stored["gpu.denoise_ms"] == 3.0
+    assert stored["gpu.opengl_ms"] == -1
+    assert set(stored) == set(gpu.UNITS)

@@ -1,4 +1,4 @@
-"""What the figures of the code itself count: their names are gates, so what they mean is fixed here."""
+"""Figures about the code itself: they are gates, so their definitions are fixed here."""
 
 from __future__ import annotations
 
@@ -45,14 +45,14 @@ def test_a_function_of_more_than_80_lines_is_long(n_lines: int, is_long: bool) -
     assert long_functions(ast.parse(text)) == ([("m", 2)] if is_long else [])
 
 
-def test_a_name_is_shared_where_three_files_define_a_function_of_it() -> None:
+def test_a_name_is_shared_if_three_files_define_a_function_of_it() -> None:
     text = "def _row(): ...\ndef {}(): ...\nclass A:\n    def _row(self): ..."
     trees = {Path(n): ast.parse(text.format(n)) for n in "abc"}
     assert shared_names(trees) == {"_row": [Path("a"), Path("b"), Path("c")]}
     assert shared_names(dict(list(trees.items())[:2])) == {}
 
 
-def test_a_heading_is_a_comment_between_blank_lines_and_one_above_a_function_is_none() -> None:
+def test_a_heading_is_a_comment_between_blank_lines_but_not_above_a_function() -> None:
     head = "\n".join(f"x{k} = {k}" for k in range(12))
     assert headings(f"{head}\n\n# A chapter.\n# It has two lines.\n\n\ndef f(): ...\n") == [
         (14, "# A chapter.")

@@ -1,4 +1,4 @@
-"""Tables of the lab book: filled from reports, left alone where a figure is missing, and those of its pages."""
+"""Tables of the lab book: filled from reports, unchanged if a figure is missing, listed per page."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def page(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     return page
 
 
-def test_a_cell_tells_figures_divided_and_yes_or_no() -> None:
+def test_a_cell_combines_figures_divisions_and_yes_or_no() -> None:
     figures = {"a.mb": 1234, "a.same": 0, "a.names": "x, y"}
     assert filled("{a.mb:,} of {a.mb/1000:.1f}", figures) == "1,234 of 1.2"
     assert filled("{a.same:yes}; {a.names}", figures) == "no; x, y"
@@ -58,19 +58,19 @@ def test_a_table_is_written_with_command_commit_machine_and_load(
     _report(tmp_path, "one", {"one.s": 6.84})
     _report(tmp_path, "two", {"two.same": 1})
     assert written_tables(tmp_path / "docs", tmp_path) == [f"{page}: ours written"]
-    said = "*`python -m benchmarks one two` (abcdef0: 2 cores of a Xeon, load 0.5, 0.5, the bench's own included).*"
+    head = "*`python -m benchmarks one two` (abcdef0: 2 cores of a Xeon, load 0.5, 0.5, the bench's own included).*"
     table = (
         "| what | value | wanted |\n|---|---|---|\n| a view | 6.8 s | 5 s |\n| the same | yes |  |"
     )
     text = page.read_text()
     assert (
-        text == f"# Page\n\n<!-- bench:ours -->\n\n{table}\n\n{said}\n\n<!-- /bench -->\n\nafter\n"
+        text == f"# Page\n\n<!-- bench:ours -->\n\n{table}\n\n{head}\n\n<!-- /bench -->\n\nafter\n"
     )
     written_tables(tmp_path / "docs", tmp_path)
     assert page.read_text() == text
 
 
-def test_tables_of_two_commits_are_told(page: Path, tmp_path: Path) -> None:
+def test_tables_of_two_commits_are_reported(page: Path, tmp_path: Path) -> None:
     _report(tmp_path, "one", {"one.s": 6.84})
     _report(tmp_path, "two", {"two.same": 1}, "0123456789ab")
     assert "tables are of 2 commits" in written_tables(tmp_path / "docs", tmp_path)[-1]
@@ -85,16 +85,16 @@ def test_a_table_without_its_report_or_a_figure_stays_and_is_named(
     assert "ours is unchanged: there is no " in said
     assert said.endswith("(python -m benchmarks one two)")
     _report(tmp_path, "two", {})
-    (said,) = written_tables(tmp_path / "docs", tmp_path)
-    assert "no figure two.same" in said
-    # A bench that measured nothing, or was killed while it wrote, leaves the others' tables alone.
+    (line,) = written_tables(tmp_path / "docs", tmp_path)
+    assert "no figure two.same" in line
+    # A bench without figures, or killed while writing, leaves the others' tables unchanged.
     _report(tmp_path, "two", {"two.same": 1})
     _report(tmp_path, "one", {"one.s": None})
-    (said,) = written_tables(tmp_path / "docs", tmp_path)
-    assert "one, two: a figure that does not fit its row: " in said
+    (line,) = written_tables(tmp_path / "docs", tmp_path)
+    assert "one, two: a figure that does not fit its row: " in line
     (tmp_path / "one.json").write_text('{"figures": {')
-    (said,) = written_tables(tmp_path / "docs", tmp_path)
-    assert "one.json is damaged" in said
+    (line,) = written_tables(tmp_path / "docs", tmp_path)
+    assert "one.json is damaged" in line
     assert page.read_text() == before
 
 
@@ -104,18 +104,18 @@ def test_a_mark_that_is_no_table_is_told(page: Path, tmp_path: Path) -> None:
         written_tables(tmp_path / "docs", tmp_path)
 
 
-def test_each_simple_table_stands_once_in_the_lab_book_with_its_rows() -> None:
-    """A page has the first cells of the table, whoever wrote it, so that figures elsewhere find them."""
+def test_each_simple_table_is_once_in_the_lab_book_with_its_rows() -> None:
+    """The first cells of the table are on the page, whoever wrote it, so that figures elsewhere find them."""
     text = "\n".join(p.read_text("utf-8") for p in (REPO / "docs/lab").glob("*.md"))
-    found = _BLOCK.findall(text)
+    blocks = _BLOCK.findall(text)
     simple = {row.table for row in ROWS_OF_BOOK}
-    assert sorted(name for name, _ in found if name in simple) == sorted(simple)
-    for name, body in found:
+    assert sorted(name for name, _ in blocks if name in simple) == sorted(simple)
+    for name, body in blocks:
         assert name in TABLES
         if name in simple:
             rows = [line.split(" | ") for line in body.splitlines() if line.startswith("| ")]
-            own = [row for row in ROWS_OF_BOOK if row.table == name]
-            assert [row[0] for row in rows] == [f"| {row.what}" for row in own], name
+            table_rows = [row for row in ROWS_OF_BOOK if row.table == name]
+            assert [row[0] for row in rows] == [f"| {row.what}" for row in table_rows], name
             assert len({len(row) for row in rows}) == 1, name
             assert "*`python -m benchmarks" in body, name
 

@@ -1,4 +1,4 @@
-"""A figure on a page outside the lab book is a number of the line of the lab book that it names."""
+"""A figure on a page outside the lab book is a number of the lab book's line that it names."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def lab(tmp_path: Path) -> Path:
     return tmp_path
 
 
-def test_every_figure_of_every_page_stands_in_the_lab_book() -> None:
+def test_every_figure_of_every_page_is_in_the_lab_book() -> None:
     assert len(manual_pages(REPO)) > 70
     assert faults_of_pages() == []
 
@@ -52,7 +52,7 @@ def test_every_figure_of_every_page_stands_in_the_lab_book() -> None:
         "a limit of 45 s",
     ],
 )
-def test_what_the_lab_book_has_and_what_is_no_measurement_is_no_fault(lab: Path, line: str) -> None:
+def test_figures_of_the_lab_book_and_unmeasured_numbers_are_no_fault(lab: Path, line: str) -> None:
     assert list(stale(line, {"45 s"}, lab)) == []
 
 
@@ -73,12 +73,12 @@ def test_what_the_lab_book_has_and_what_is_no_measurement_is_no_fault(lab: Path,
         ("of a sofa <!-- figure: sofas.md: sofa -->", "docs/lab/sofas.md has no row"),
     ],
 )
-def test_a_figure_that_the_lab_book_does_not_have_is_told_with_its_line(
+def test_a_figure_missing_in_the_lab_book_is_reported_with_its_line(
     lab: Path, line: str, told: str
 ) -> None:
-    ((number, what),) = stale(f"# Page\n\n{line}\n", set(), lab)
+    ((number, text),) = stale(f"# Page\n\n{line}\n", set(), lab)
     assert number == 3
-    assert told in what
+    assert told in text
 
 
 def test_the_table_of_other_renderers_names_rows_of_the_lab_book_that_have_its_figures(

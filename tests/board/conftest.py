@@ -1,4 +1,4 @@
-"""One small root, served once for the tests that only look."""
+"""One small root, served once for the read-only tests."""
 
 from __future__ import annotations
 

@@ -26,9 +26,9 @@ TOKEN = "a token that nobody guesses"
 def served(
     root: str, cache: Path, farm: LiveFarm | None = None, **options: Any
 ) -> Iterator[httpx.Client]:
-    """A client of the board of a root, which has read all of it.
+    """A client of the board of a root, after the board has read all of it.
 
-    options: of BoardOptions; host is what the board believes, it listens on 127.0.0.1.
+    options: of BoardOptions; host is the board's configured host, it listens on 127.0.0.1.
     """
     listening = bound_socket("127.0.0.1", 0)
     port = listening.getsockname()[1]

@@ -1,4 +1,4 @@
-"""Pages of a farm: live jobs and workers, changes after a confirmation, and the audit of changes."""
+"""Pages of a farm: live jobs and workers, confirmed changes, and the audit log."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def farm(config: FarmConfig, monkeypatch: pytest.MonkeyPatch, tmp_path: Path) ->
 
 @pytest.fixture
 def drive(farm: Farm) -> Drive:
-    """A job of three homes: one done, one failed with a stranger's words, one running."""
+    """A job of three homes: one done, one failed with an untrusted message, one running."""
     job = farm.submit(HOUSES, new_spec(recipe_from_name("preview"))).job_id
     drive = Drive(farm.ledger, farm.spec(job))
     first, second, third = drive.dispatch()
@@ -63,14 +63,14 @@ def client(farm: Farm, drive: Drive, tmp_path: Path) -> Iterator[httpx.Client]:
 
 
 def do(client: httpx.Client, what: str, of: str, **more: str) -> httpx.Response:
-    """Confirm a change as a person would, from its own page."""
+    """Confirm a change from its page."""
     html = client.get("/farm/confirm", params={"what": what, "of": of, **more}).text
     match = re.search(r'name="form_word" value="([0-9a-f]{64})"', html)
     word = match[1] if match else ""
     return client.post("/farm/do", data={"form_word": word, "what": what, "of": of, **more})
 
 
-def test_jobs_and_workers_are_listed_with_what_runs(client: httpx.Client, drive: Drive) -> None:
+def test_jobs_and_workers_are_listed_with_their_tasks(client: httpx.Client, drive: Drive) -> None:
     html = client.get("/farm").text
     assert drive.job.job_id in html
     assert "h2/-/geometry" in html
@@ -78,7 +78,7 @@ def test_jobs_and_workers_are_listed_with_what_runs(client: httpx.Client, drive:
     assert "running" in html
 
 
-def test_the_farm_says_which_homes_are_finished(farm: Farm) -> None:
+def test_the_farm_lists_finished_homes(farm: Farm) -> None:
     job = farm.submit(HOUSES, new_spec(recipe_from_name("preview"))).job_id
     drive, live = Drive(farm.ledger, farm.spec(job)), LiveFarm(farm)
     assert live.finished_houses() == set()
@@ -114,7 +114,7 @@ def test_cost_is_slot_hours_times_the_operators_price(
         assert f"{3600 * row['slot_hours']:.2f} CHF" in client.get("/farm").text
 
 
-def test_a_change_is_asked_confirmed_done_and_written_down(
+def test_a_change_is_requested_confirmed_done_and_logged(
     client: httpx.Client, farm: Farm, drive: Drive, tmp_path: Path
 ) -> None:
     job = drive.job.job_id
@@ -133,7 +133,7 @@ def test_a_change_is_asked_confirmed_done_and_written_down(
     assert "paused" in client.get("/farm").text
 
 
-def test_a_user_of_the_farm_changes_by_his_own_rights_and_the_line_names_him(
+def test_a_users_changes_need_his_rights_and_are_logged_with_his_name(
     client: httpx.Client, farm: Farm, drive: Drive, tmp_path: Path
 ) -> None:
     job = drive.job.job_id
@@ -177,7 +177,7 @@ def test_a_priority_is_changed_confirmed_and_kept_for_a_recovery(
     assert (row["what"], row["of"], row["answer"]) == ("priority", job, "5 -> 1")
 
 
-def test_a_worker_tells_its_memory(client: httpx.Client, farm: Farm) -> None:
+def test_a_worker_reports_its_memory(client: httpx.Client, farm: Farm) -> None:
     assert "GB" not in client.get("/farm").text
     Registry(farm.ledger).heartbeat(memory_mb=1536.0)
     assert re.search(r"1\.5 of [\d.]+ GB", workers_text(farm.workers()))
@@ -196,7 +196,7 @@ def test_failed_tasks_are_retried(client: httpx.Client, farm: Farm, drive: Drive
     assert farm.failures(drive.job.job_id) == []
 
 
-def test_a_worker_is_drained_and_asked_back(client: httpx.Client, farm: Farm) -> None:
+def test_a_worker_is_drained_and_undrained(client: httpx.Client, farm: Farm) -> None:
     log_in(client)
     for action, state in (("drain", "draining"), ("undrain", "alive")):
         assert do(client, action, "w1").status_code == 303
@@ -205,12 +205,12 @@ def test_a_worker_is_drained_and_asked_back(client: httpx.Client, farm: Farm) ->
 
 
 @pytest.mark.parametrize(("what", "of"), [("explode", "x"), ("pause", ""), ("drain", "")])
-def test_what_cannot_be_done_is_not_asked(what: str, of: str, client: httpx.Client) -> None:
+def test_impossible_changes_are_not_offered(what: str, of: str, client: httpx.Client) -> None:
     log_in(client)
     assert client.get("/farm/confirm", params={"what": what, "of": of}).status_code == 404
 
 
-def test_a_job_that_is_none_is_told(client: httpx.Client) -> None:
+def test_an_invalid_job_is_refused(client: httpx.Client) -> None:
     assert client.get("/farm/jobs/0123456789ab").status_code == 404
     assert client.get("/farm/jobs/..%2f..").status_code == 404
     assert client.get("/farm/jobs/not-a-job").status_code == 404
@@ -236,14 +236,14 @@ def first_event(client: httpx.Client, path: str) -> dict[str, str]:
     raise AssertionError("no event")
 
 
-def test_pages_hear_of_what_changes(client: httpx.Client, drive: Drive) -> None:
+def test_pages_receive_changes(client: httpx.Client, drive: Drive) -> None:
     assert "h2/-/geometry" in first_event(client, "/farm/events")["farm"]
     parts = first_event(client, f"/farm/events?job={drive.job.job_id}")
     assert "&lt;script&gt;alert" in parts["job"]
     assert "not in the ledger" in first_event(client, "/farm/events?job=0123456789ab")["job-fault"]
 
 
-def test_ten_who_look_ask_redis_once(
+def test_ten_viewers_query_redis_once(
     farm: Farm, drive: Drive, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     requests: list[str] = []
@@ -258,9 +258,7 @@ def test_ten_who_look_ask_redis_once(
     assert requests == ["x", "x"]
 
 
-def test_a_farm_that_does_not_answer_is_told_and_the_root_is_shown(
-    farm: Farm, tmp_path: Path
-) -> None:
+def test_a_silent_farm_is_reported_and_the_root_is_shown(farm: Farm, tmp_path: Path) -> None:
     from pbrs_farm.store.secret import Secret
 
     away = Farm(replace(farm.config, redis_url=Secret("redis://127.0.0.1:1/0")))
@@ -270,7 +268,7 @@ def test_a_farm_that_does_not_answer_is_told_and_the_root_is_shown(
         assert client.get("/").status_code == 200
 
 
-def test_a_board_of_a_folder_alone_has_no_farm(root: Path, tmp_path: Path) -> None:
+def test_a_board_of_a_folder_has_no_farm(root: Path, tmp_path: Path) -> None:
     with served(str(root), tmp_path) as client:
         assert client.get("/farm").status_code == 404
         assert 'href="/farm"' not in client.get("/").text

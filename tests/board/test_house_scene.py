@@ -28,9 +28,7 @@ POSE = np.eye(4).tolist()
 SIZE = {"width_px": 640, "height_px": 480, "fx": 500.0, "fy": 500.0, "cx": 320.0, "cy": 240.0}
 
 
-def test_a_scene_has_rooms_cameras_and_counts_and_leaves_out_what_is_damaged(
-    tmp_path: Path,
-) -> None:
+def test_a_scene_has_rooms_cameras_and_counts_without_damaged_parts(tmp_path: Path) -> None:
     root = write_root(tmp_path / "root", {"a-1": ("0_0_1",)})
     views = [
         {"id": "0_0_1", "room": "0_0", "intrinsics": SIZE, "world_from_camera_opengl": POSE},
@@ -46,12 +44,12 @@ def test_a_scene_has_rooms_cameras_and_counts_and_leaves_out_what_is_damaged(
         scene = client.get("/homes/a-1/scene.json").json()
         assert [room["name"] for room in scene["rooms"]] == ["Kitchen", "Bath"]
         assert [camera["id"] for camera in scene["cameras"]] == ["0_0_1", "0_0_5"]
-        # The rendered one links to its picture.
+        # The rendered viewpoint links to its picture.
         assert scene["cameras"][0]["url"] == "/homes/a-1/views/0_0_1"
         assert scene["cameras"][1]["url"] == ""
         assert scene["refused"] == report["refused"]
         assert client.get("/homes/a-1/house.glb").content == b"glTF"
-        # Nothing to sample from: said in one line, not a traceback.
+        # An empty home gives one line rather than a traceback.
         answer = client.get("/homes/a-1/candidates.json")
         assert answer.status_code == 422
         assert "Traceback" not in answer.text

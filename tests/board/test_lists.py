@@ -68,7 +68,7 @@ def test_the_first_page_lists_homes_with_their_credit(client: httpx.Client) -> N
         ("has=no-such-class&mode=x'--", 4),
     ],
 )
-def test_a_filter_in_the_address_says_which_views_are_listed(
+def test_a_filter_in_the_address_selects_the_listed_views(
     query: str, n: int, client: httpx.Client
 ) -> None:
     html = client.get(f"/views?{query}").text
@@ -76,7 +76,7 @@ def test_a_filter_in_the_address_says_which_views_are_listed(
     assert html.count('class="card"') == n
 
 
-def test_htmx_gets_the_results_alone_and_a_tidy_address(client: httpx.Client) -> None:
+def test_htmx_gets_only_the_results_and_a_normalised_address(client: httpx.Client) -> None:
     answer = client.get("/views?home=&room=Bath&words=", headers={"HX-Request": "true"})
     assert "<html" not in answer.text
     assert answer.headers["hx-push-url"] == "/views?room=Bath"
@@ -106,7 +106,7 @@ def read_queries(root: Path, tmp_path: Path) -> Queries:
     return Queries(index)
 
 
-def test_what_a_run_adds_or_removes_is_seen_at_the_next_look(tmp_path: Path) -> None:
+def test_views_added_or_removed_by_a_run_appear_at_the_next_refresh(tmp_path: Path) -> None:
     root = write_root(tmp_path / "root", {"a-1": ("0_0_1",)})
     index = ViewIndex(tmp_path / "index.sqlite")
     refresher, queries = Refresher(RootReader(FolderStore(root)), index), Queries(index)
@@ -160,7 +160,7 @@ def test_a_store_with_a_manifest_or_a_farm_is_never_listed(tmp_path: Path) -> No
     entry = queries.view("c-3", "0_0_7")
     assert entry is not None
     assert entry.has("depth")
-    # The merged manifest says of each house what its own says: nothing is read again.
+    # The merged manifest repeats each house's manifest: no file is read again.
     generation = index.generation
     store.put(keys.MANIFEST, b"".join(store.get(f"houses/{h}/manifest.jsonl") for h in HOMES))
     refresher.refresh()
@@ -219,9 +219,7 @@ def test_a_page_that_is_no_number_is_the_first(text: str) -> None:
     assert page_number(text) == 1
 
 
-def test_a_view_names_its_things_its_files_and_its_seconds(
-    root: Path, client: httpx.Client
-) -> None:
+def test_a_view_lists_its_items_its_files_and_its_seconds(root: Path, client: httpx.Client) -> None:
     marker = {"step": "light", "seconds": 12.5, "worker": "w7"}
     (root / "houses/a-1/done/light.0_0_1.json").write_text(json.dumps(marker))
     html = client.get(VIEW).text
@@ -247,7 +245,7 @@ def test_a_thumbnail_is_made_once_and_may_be_kept(root: Path, client: httpx.Clie
     assert client.get(f"{VIEW}/thumb/hha.jpg").status_code == 404
 
 
-def test_a_label_is_shown_in_colours_and_saved_as_it_is(root: Path, client: httpx.Client) -> None:
+def test_a_label_is_shown_in_colours_and_saved_unchanged(root: Path, client: httpx.Client) -> None:
     shown = array_from_png(client.get(f"{VIEW}/shown/instance.png").content)
     assert len(np.unique(shown.reshape(-1, 3), axis=0)) == 2
     stored = root / "houses/a-1/views/0_0_1/instance.png"
@@ -285,7 +283,7 @@ def test_scripts_are_sent_packed_and_kept_by_their_version(client: httpx.Client)
     assert again.status_code == 304
 
 
-def test_what_is_not_there_is_told(client: httpx.Client) -> None:
+def test_missing_pages_are_reported(client: httpx.Client) -> None:
     for path in ("/homes/zzz", "/homes/a-1/views/zzz", "/nothing"):
         answer = client.get(path)
         assert answer.status_code == 404
@@ -316,12 +314,12 @@ def test_the_head_names_the_root_and_no_path_of_the_machine(
         assert str(root.parent) not in text
 
 
-def test_a_page_says_that_the_root_is_being_read(tmp_path: Path) -> None:
+def test_a_page_reports_that_the_root_is_being_read(tmp_path: Path) -> None:
     root = write_root(tmp_path / "root", {})
     board = new_board(
         store_from_url(str(root)), BoardOptions(cache=tmp_path, port=0, token=Secret(TOKEN))
     )
-    # Asked without a server, which would begin to read.
+    # Without a server, which would start reading.
     transport = httpx.ASGITransport(application(board))
 
     async def answers() -> tuple[str, str]:
@@ -329,32 +327,32 @@ def test_a_page_says_that_the_root_is_being_read(tmp_path: Path) -> None:
             progress, page = await client.get("/progress"), await client.get("/")
         return progress.json()["text"], page.text
 
-    def told(progress: Progress) -> tuple[str, str]:
+    def progress_lines(progress: Progress) -> tuple[str, str]:
         board.refresher.progress = progress
         return asyncio.run(answers())
 
-    # Nothing was looked at yet: the root may be large, and is not called empty.
-    text, page = told(board.refresher.progress)
+    # No file is read yet: the root may be large, and is not reported as empty.
+    text, page = progress_lines(board.refresher.progress)
     assert "Looking for homes" in text
     assert text in page
     assert "root has no homes yet" not in page
     assert "reading.js" in page
-    text, page = told(Progress(1200, 7))
+    text, page = progress_lines(Progress(1200, 7))
     assert text.startswith("Reading homes: 7 of 1,200.")
     assert text in page
     board.refresher.refresh()
-    text, page = told(board.refresher.progress)
+    text, page = progress_lines(board.refresher.progress)
     assert text == ""
     assert "root has no homes yet" in page
     assert "reading.js" not in page
 
 
 def test_words_of_the_board_are_explained(client: httpx.Client) -> None:
-    # Each rule of the sampler and each reason of a selection has a meaning.
+    # Each rule of the sampler and each reason of a selection has an explanation.
     assert set(OF_A_CANDIDATE) == {v.label.replace("_", " ") for v in Verdict}
     assert set(OF_A_SELECTION) == {*REASONS, *RULE_REASONS.values()}
     page = html.unescape(client.get("/homes/a-1/views/0_0_1").text)
     for word in ("sector", "cropped", "visible"):
         assert f"<dt>{word}</dt><dd>{OF_A_VIEW[word]}</dd>" in page
-    assert "<dt>noise</dt>" not in page  # which this view does not tell
+    assert "<dt>noise</dt>" not in page  # not recorded in this view
     assert OF_A_CANDIDATE["below min score"] in html.unescape(client.get("/homes/a-1").text)

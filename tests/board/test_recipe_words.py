@@ -14,11 +14,11 @@ from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.store.folder import FolderStore
 
 
-def test_a_view_says_its_recipe(client: httpx.Client) -> None:
+def test_a_view_shows_its_recipe(client: httpx.Client) -> None:
     assert "<dt>recipe</dt><dd><b>preview</b></dd>" in client.get("/homes/a-1/views/0_0_1").text
 
 
-def test_a_recipe_is_the_nearest_preset_and_what_differs(tmp_path: Path) -> None:
+def test_a_recipe_is_the_nearest_preset_and_the_differences(tmp_path: Path) -> None:
     recipe = recipe_from_name("paper", {"light.spp": "16", "tone.key": "0.5"})
     (tmp_path / "recipe.json").write_bytes(json_bytes(recipe))
     words = recipe_words(RootReader(FolderStore(tmp_path)))

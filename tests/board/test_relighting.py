@@ -1,4 +1,4 @@
-"""The light that a browser sums is the stored light, as half floats, with the recipe's tone."""
+"""The light summed in the browser is the stored light, as half floats, with the recipe's tone."""
 
 from __future__ import annotations
 
@@ -69,12 +69,14 @@ def test_a_lens_that_glares_glares_in_the_sum_that_a_browser_makes(tmp_path: Pat
         np.testing.assert_allclose(total / facts["scale"], expected, rtol=2e-3)
 
 
-def test_a_page_says_the_command_that_makes_the_same_file(root: Path, client: httpx.Client) -> None:
+def test_a_page_shows_the_command_that_makes_the_same_file(
+    root: Path, client: httpx.Client
+) -> None:
     html = client.get(f"{VIEW}/relight").text
     assert f"pbrs-farm relight {root}/houses/a-1/views/0_0_1" in html
 
 
-def test_a_view_without_light_and_one_with_damaged_light_say_so(tmp_path: Path) -> None:
+def test_a_view_with_missing_or_damaged_light_reports_it(tmp_path: Path) -> None:
     root = write_root(tmp_path / "root", {"a-1": ("0_0_1", "0_0_2")})
     (root / "houses/a-1/views/0_0_1/radiance.exr").write_bytes(b"no picture")
     (root / "houses/a-1/views/0_0_2/radiance.exr").unlink()
@@ -88,13 +90,13 @@ def test_a_view_without_light_and_one_with_damaged_light_say_so(tmp_path: Path) 
 @pytest.mark.parametrize(
     ("exposure", "largest", "scale"), [(1.0, 100.0, 1.0), (0.3, 1.0, 0.25), (1024.0, 1e4, 4.0)]
 )
-def test_light_is_scaled_to_what_half_floats_hold(
+def test_light_is_scaled_to_the_range_of_half_floats(
     exposure: float, largest: float, scale: float
 ) -> None:
     assert scale_of(exposure, largest) == scale
 
 
-def test_what_is_no_number_becomes_one() -> None:
+def test_nan_becomes_a_number() -> None:
     plane = np.float32([[[np.nan, np.inf, -1.0]]])
     _facts, planes = unpacked(packet({"outdoor": plane}, {}))
     assert planes["outdoor"].reshape(-1).tolist() == [0.0, 60_000.0, 0.0]

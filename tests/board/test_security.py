@@ -48,7 +48,7 @@ def test_beyond_loopback_nothing_is_read_without_the_token(root: Path, tmp_path:
         for path in ("/", "/views", VIEW, f"{VIEW}/file/depth", f"{VIEW}/pixels"):
             answer = client.get(path)
             assert (answer.status_code, answer.headers["location"]) == (303, "/login")
-        # Files of the form are readable.
+        # The form's static files are readable.
         assert client.get("/login").status_code == 200
         assert client.get("/static/board.css").status_code == 200
         assert log_in(client, "a guess").status_code == 403
@@ -86,7 +86,7 @@ def test_a_change_needs_a_session_and_its_form_word(root: Path, tmp_path: Path) 
         assert client.post("/logout", data={"form_word": "0" * 64}).status_code == 403
         word = form_word(client)
         assert client.post("/logout", data={"form_word": word}).status_code == 303
-        # The session has ended: its word is worth nothing now.
+        # The session has ended: its token is invalid now.
         assert client.post("/logout", data={"form_word": word}).status_code == 401
 
 
@@ -142,7 +142,7 @@ def test_every_answer_forbids_inline_scripts_frames_and_guessed_types(client: ht
 
 
 @pytest.mark.parametrize("path", ["/", "/views", VIEW, "/login"])
-def test_pages_hold_no_script_and_no_style_of_their_own(path: str, client: httpx.Client) -> None:
+def test_pages_contain_no_inline_script_or_style(path: str, client: httpx.Client) -> None:
     html = client.get(path).text
     assert not re.search(r"<script(?![^>]*\bsrc=)", html)
     assert not re.search(r"<style|\sstyle=|\son\w+=|javascript:", html)
@@ -165,7 +165,7 @@ def test_pages_hold_no_script_and_no_style_of_their_own(path: str, client: httpx
     ],
 )
 def test_no_address_leads_to_a_file_that_is_not_listed(path: str, client: httpx.Client) -> None:
-    # Written by hand: a client tidies "..".
+    # A hand-written request: a client normalises "..".
     request = client.build_request("GET", "/")
     request.url = request.url.copy_with(raw_path=path.encode())
     answer = client.send(request)
@@ -215,7 +215,7 @@ def test_a_view_json_of_nonsense_is_shown_as_far_as_it_goes(tmp_path: Path) -> N
         assert client.get(f"{VIEW}/pixels").status_code == 200
 
 
-def test_who_asks_too_often_waits(root: Path, tmp_path: Path) -> None:
+def test_frequent_requests_are_delayed(root: Path, tmp_path: Path) -> None:
     limits = BoardLimits(requests_per_s=0.001, burst=5)
     with served(str(root), tmp_path, limits=limits) as client:
         codes = [client.get("/login").status_code for _ in range(7)]
@@ -225,7 +225,7 @@ def test_who_asks_too_often_waits(root: Path, tmp_path: Path) -> None:
 
 @contextmanager
 def half_open(client: httpx.Client, n: int, sent: bytes) -> Iterator[list[socket.socket]]:
-    """n connections that sent so much and say no more."""
+    """n connections that sent some bytes and then stay silent."""
     address = (client.base_url.host, client.base_url.port or 0)
     with ExitStack() as stack:
         sockets = [stack.enter_context(socket.create_connection(address)) for _ in range(n)]
@@ -234,12 +234,12 @@ def half_open(client: httpx.Client, n: int, sent: bytes) -> Iterator[list[socket
         yield sockets
 
 
-def test_three_hundred_half_open_connections_keep_nobody_out(root: Path, tmp_path: Path) -> None:
+def test_three_hundred_half_open_connections_block_nobody(root: Path, tmp_path: Path) -> None:
     with served(str(root), tmp_path) as client, half_open(client, 300, b"GET / HTTP/1.1\r\n"):
         assert [client.get(path).status_code for path in ("/", "/health", VIEW)] == [200] * 3
 
 
-def test_who_connects_must_ask_in_time(root: Path, tmp_path: Path) -> None:
+def test_a_connection_without_a_timely_request_is_closed(root: Path, tmp_path: Path) -> None:
     limits = BoardLimits(receive_s=0.2)
     form = b"POST /login HTTP/1.1\r\nHost: localhost\r\nContent-Length: 9\r\n\r\ntoken"
     with served(str(root), tmp_path, limits=limits) as client:
@@ -256,12 +256,12 @@ def test_who_connects_must_ask_in_time(root: Path, tmp_path: Path) -> None:
 def test_a_wrong_bearer_counts_as_a_wrong_login(root: Path, tmp_path: Path) -> None:
     with served(str(root), tmp_path, host="0.0.0.0") as client:
 
-        def asked(token: str) -> int:
+        def status_of(token: str) -> int:
             return client.get("/views", headers={"Authorization": f"Bearer {token}"}).status_code
 
-        assert [asked(TOKEN) for _ in range(9)] == [200] * 9
-        assert [asked(f"guess {k}") for k in range(6)] == [303] * 5 + [429]
-        assert asked(TOKEN) == 429
+        assert [status_of(TOKEN) for _ in range(9)] == [200] * 9
+        assert [status_of(f"guess {k}") for k in range(6)] == [303] * 5 + [429]
+        assert status_of(TOKEN) == 429
         assert log_in(client).status_code == 429
 
 

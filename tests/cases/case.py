@@ -1,4 +1,4 @@
-"""What a case is, and the ways of looking at what became of its file. Effects: processes, where a command is run."""
+"""A case, and ways to inspect the result of reading its file. Effects: processes, if a command is run."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ Rgb = tuple[float, float, float]
 
 @dataclass(frozen=True, slots=True)
 class Case:
-    """A file that was read wrongly once. write: into a folder; gives what a user would name.
+    """A file once read wrongly. write: writes it into a folder and returns the path to name.
 
-    ask: AssertionError, or any other, where what becomes of the file is not what is right.
+    ask: raises AssertionError, or any other error, if the result is wrong.
     """
 
     name: str
@@ -36,17 +36,17 @@ class Case:
 
 
 def house_of(path: Path) -> House:
-    """The house as it is read."""
+    """The house as read."""
     return read_house(resolve(str(path)), ReadFields())
 
 
 def repaired(path: Path) -> tuple[House, RepairReport]:
-    """The house that pictures are made of, and the report of its repair."""
+    """The house as rendered, and the report of its repair."""
     return repaired_house(resolve(str(path)), recipe_from_name("preview"))
 
 
 def run(path: Path, out: Path) -> None:
-    """Run the file by the command; AssertionError where it gives no picture."""
+    """Run the file with the command; AssertionError if it gives no picture."""
     ended = watch(("run", str(path), "--out", str(out), *ONE_VIEW), limit_s=180.0)
     assert ended.code == 0, ended.text[-500:]
     assert list(out.glob("houses/*/views/*/opengl_dl.png")), "no picture"
@@ -61,17 +61,17 @@ def shown(path: Path, eye: Rgb, target: Rgb, *, layers: tuple[str, ...] = ()) ->
 
 
 def depth_to(frame: Frame, eye: Rgb, point: Rgb) -> tuple[float, float]:
-    """Depth in the pixel of a point, and the depth of the point itself, metres."""
+    """Depth at the pixel of a point, and the depth of the point itself, metres."""
     in_camera = np.linalg.inv(frame.world_from_camera_opencv) @ [*point, 1.0]
     u, v, w = frame.k @ in_camera[:3]
     return float(frame.depth[int(v / w), int(u / w)]), float(in_camera[2])
 
 
 def named(house: House, name: str) -> Item:
-    """The item of that name; AssertionError where there is none."""
-    found = [i for i in house.items if i.name == name]
-    assert found, f"no {name!r} among {sorted(i.name for i in house.items)}"
-    return found[0]
+    """The item of that name; AssertionError if it is missing."""
+    matches = [i for i in house.items if i.name == name]
+    assert matches, f"no {name!r} among {sorted(i.name for i in house.items)}"
+    return matches[0]
 
 
 def material_of(house: House, name: str) -> Material:
@@ -80,5 +80,5 @@ def material_of(house: House, name: str) -> Material:
 
 
 def kinds_of_notes(house: House) -> set[str]:
-    """The kinds of its notes."""
+    """The kinds of the house's notes."""
     return {note.kind for note in house.notes}

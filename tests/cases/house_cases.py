@@ -1,4 +1,4 @@
-"""Cases of rooms, walls, openings and roofs, in every format that tells them; writers write files."""
+"""Cases of rooms, walls, openings and roofs, in every format with rooms; writers write files."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def cases() -> Iterator[Case]:
 
 
 def _habitat(scale: float, folder: Path) -> Path:
-    """A scene whose name has a space; its stage is drawn in a unit of that many metres."""
+    """A scene with a space in its name, and its stage in a unit of `scale` metres."""
     stage = two_rooms()
     stage.node("all", children=list(range(len(stage.nodes))), scale=[1 / scale] * 3)
     path = dataset(folder, stage, translation_origin="COM")
@@ -165,7 +165,7 @@ def _attic_scan(folder: Path) -> Path:
 
 
 def _ask_for_gables(path: Path) -> None:
-    """The room is as high as its gables under the ridge and as its knee walls at the eaves."""
+    """The room is as high as its gables at the ridge and as its knee walls at the eaves."""
     house, report = repaired(path)
     tops = np.array([i.bounds[1, 1] for i in house.items if i.kind is ItemKind.CEILING])
     lows = np.array([i.bounds[0, 1] for i in house.items if i.kind is ItemKind.CEILING])
@@ -355,7 +355,7 @@ def _ask_for_a_sloped_ceiling(path: Path) -> None:
 
 
 def _low_ceiling(house: IfcHouse) -> None:
-    """A space of 2.5 m under a deck, and a ceiling that hangs at 2.2 m."""
+    """A space of 2.5 m under a deck, with a ceiling suspended at 2.2 m."""
     house.storey("s", 0.0)
     _four_walls(house, 0.0, 2.8)
     _slab(house, "floor", -0.25, 0.25, "FLOOR")
@@ -375,7 +375,7 @@ def _ask_for_the_height_of_the_ceiling(path: Path) -> None:
 
 
 def _two_storeys(house: IfcHouse) -> None:
-    """A flat roof and the floor between as exporters name slabs, without a type."""
+    """A flat roof and an intermediate floor, named as exporters do, without a type."""
     house.storey("ground", 0.0)
     _slab(house, "Floor:Concrete", -0.25, 0.25, "FLOOR")
     _four_walls(house, 0.0, 2.5)
@@ -395,7 +395,7 @@ _WEDGE: Final = [(0.0, 0.0), (0.6, 0.0), (0.6, 0.4)]
 
 
 def _mapped(house: IfcHouse) -> None:
-    """A wedge of one representation map four times: as it is, turned, half as large, mirrored."""
+    """A wedge of one representation map four times: unchanged, turned, half as large, mirrored."""
     house.storey("s", 0.0)
     _four_walls(house, 0.0, 2.5)
     _slab(house, "floor", -0.25, 0.25, "FLOOR")
@@ -418,8 +418,8 @@ def _mapped(house: IfcHouse) -> None:
         )
         mapped = m.createIfcMappedItem(source, operator)
         name = f"Table {k}"
-        found = house.product("IfcFurniture", name, [mapped], (1.5 + k, 2.0, 0.0))
-        found.Representation.Representations[0].RepresentationType = "MappedRepresentation"
+        product = house.product("IfcFurniture", name, [mapped], (1.5 + k, 2.0, 0.0))
+        product.Representation.Representations[0].RepresentationType = "MappedRepresentation"
 
 
 def _ask_for_positive_volumes(path: Path) -> None:

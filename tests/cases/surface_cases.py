@@ -1,4 +1,4 @@
-"""Cases of materials, pictures and how they lie, in glTF and OpenUSD; writers write files."""
+"""Cases of materials, pictures and their mapping, in glTF and OpenUSD; writers write files."""
 
 from __future__ import annotations
 
@@ -111,8 +111,8 @@ def _write_glb(scene: Callable[[], Scene], folder: Path) -> Path:
     return path
 
 
-# Name of a crate -> alpha of its picture's upper half, how the file says that it is cut, whether that
-# is a hole.
+# Name of a crate -> alpha of its picture's upper half, the alpha mode in the file, whether it is a
+# hole.
 _CRATES: Final[dict[str, tuple[int, dict[str, Any], bool]]] = {
     "Crate 0": (150, {"alphaMode": "MASK", "alphaCutoff": 0.2}, False),
     "Crate 1": (150, {"alphaMode": "MASK", "alphaCutoff": 0.9}, True),
@@ -204,7 +204,7 @@ def _materialx(path: Path, node: str) -> Path:
 
 
 def _usd_room(path: Path) -> tuple[UsdHome, Any]:
-    """A room of 4 x 3 m and a table in it, which has no material yet."""
+    """A room of 4 x 3 m with a table, which has no material yet."""
     home = UsdHome(path, up="Y")
     walls_of(home, "/World/Kitchen", 0, 4, 0, 3)
     return home, home.box(
@@ -269,13 +269,13 @@ def _ask_for_the_name_of_the_tile(path: Path) -> None:
 
 
 def _write_wraps(folder: Path) -> Path:
-    """The same room three times, its floor's picture set three ways; the folder."""
+    """Write the same room three times with three wrap modes of its floor's picture; returns the folder."""
     colours = np.array([[[200, 30, 30], [30, 200, 30]], [[30, 30, 200], [200, 200, 30]]], np.uint8)
     for name, mode in _AXES.items():
         s = room()
         _with_pictures(s, _encoded(colours), wrapS=mode, wrapT=mode)
         s.materials.append(_textured("Rug floor"))
-        # The floor's uv go from -1 to 2 on each of its sides.
+        # The floor's uv range from -1 to 2 on each of its sides.
         floor = s.box([0, -0.12, 0], [4, 0, 3.5], 1)
         uvs = np.tile(np.array([[-1, 2], [2, 2], [2, -1], [-1, -1]], np.float32), (6, 1))
         s.meshes[floor]["primitives"][0]["attributes"]["TEXCOORD_0"] = s.writer.add_vertices(uvs)
@@ -285,7 +285,7 @@ def _write_wraps(folder: Path) -> Path:
 
 
 def _floor(s: Scene, material: int, *uv_sets: np.ndarray[Any, Any]) -> int:
-    """The floor as one quad with sets of texture coordinates of its own."""
+    """The floor as one quad with its sets of texture coordinates."""
     number = s.mesh([[[0, 0, 3.5], [4, 0, 3.5], [4, 0, 0], [0, 0, 0]]], material)
     attributes = s.meshes[number]["primitives"][0]["attributes"]
     for k, uvs in enumerate(uv_sets):
@@ -294,14 +294,14 @@ def _floor(s: Scene, material: int, *uv_sets: np.ndarray[Any, Any]) -> int:
 
 
 def _ask_for_three_wraps(folder: Path) -> None:
-    """Each picture is as its file says, or a note tells that it is not."""
-    seen: list[bytes] = []
+    """Each picture follows its file, or a note reports the difference."""
+    pictures: list[bytes] = []
     for name in _AXES:
         path = folder / f"{name}.glb"
         if "texture-layout" not in kinds_of_notes(house_of(path)):
             frame = shown(path, _EYE, (2.0, 0.0, 2.0), layers=("albedo",))
-            seen.append(np.asarray(frame.layer("albedo")).tobytes())
-    assert len(set(seen)) == len(seen), "two of clamp, mirror and repeat give one picture"
+            pictures.append(np.asarray(frame.layer("albedo")).tobytes())
+    assert len(set(pictures)) == len(pictures), "two of clamp, mirror and repeat give one picture"
 
 
 _SECOND: Final = np.array([[0, 4], [4, 4], [4, 0], [0, 0]], np.float32)
@@ -310,9 +310,12 @@ _SECOND: Final = np.array([[0, 4], [4, 4], [4, 0], [0, 0]], np.float32)
 def _second_uvs() -> Scene:
     s = room()
     _with_pictures(s, png())
-    own = {"KHR_texture_transform": {"texCoord": 1, "scale": [1, 1]}}
+    extensions = {"KHR_texture_transform": {"texCoord": 1, "scale": [1, 1]}}
     material = _textured("Tiles")
-    material["pbrMetallicRoughness"]["baseColorTexture"] |= {"texCoord": 0, "extensions": own}
+    material["pbrMetallicRoughness"]["baseColorTexture"] |= {
+        "texCoord": 0,
+        "extensions": extensions,
+    }
     s.materials.append(material)
     s.nodes[0]["mesh"] = _floor(s, 1, _SECOND / 4, _SECOND)
     return s
@@ -364,10 +367,12 @@ def _obj_without_its_picture(folder: Path) -> Path:
 
 
 def _ask_for_a_warning(path: Path) -> None:
-    with warnings.catch_warnings(record=True) as said:
+    with warnings.catch_warnings(record=True) as caught:
         warnings.simplefilter("always")
         pf.model(path)
-    assert any("nothere.png" in str(one.message) for one in said), "no word of its picture"
+    assert any("nothere.png" in str(warning.message) for warning in caught), (
+        "no word of its picture"
+    )
 
 
 def _sky_from_below(folder: Path) -> Path:

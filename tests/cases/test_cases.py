@@ -1,4 +1,4 @@
-"""Files that were read wrongly once are read rightly."""
+"""Files once read wrongly are read correctly."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Cases of trajectories as other systems write them; writers write files."""
+"""Cases of trajectories from other systems; writers write files."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ _STAMPS: Final = (1305031102.1758, 1305031102.2091, 1305031102.2425, 1305031102.
 
 
 def cases() -> list[Case]:
-    """By what is unusual in them."""
+    """Named by their unusual feature."""
     return [
         Case("bom_crlf", partial(_write, "\ufeff", "\r\n", 1.0), _ask_for_the_stamps),
         Case("nanoseconds", partial(_write, "", "\n", 1e9), _ask_for_the_stamps),

@@ -1,6 +1,6 @@
 """Kinds of falsehood, each planted in a finished root: the change, and the check that must find it.
 
-Effects: a plant changes files of the root that it is given; `planted` mends all hashes afterwards.
+Effects: a plant changes files of the given root; `planted` updates all hashes afterwards.
 """
 
 from __future__ import annotations
@@ -91,7 +91,7 @@ def exr(file: str, change: Callable[[np.ndarray], np.ndarray]) -> Plant:
 
 
 def brighter_shading(view: Path) -> None:
-    """Shading a tenth brighter, and a residual that makes up for it."""
+    """Shading a tenth brighter, with a residual that compensates."""
     srgb = array_from_png((view / "albedo.png").read_bytes()) / 255
     albedo = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
     for ending in ("", "_indoor", "_outdoor"):
@@ -105,7 +105,7 @@ def brighter_shading(view: Path) -> None:
 
 
 def brighter_diffuse_light(view: Path) -> None:
-    """The same, and the diffuse light that it is made of."""
+    """The same, with the diffuse light that it is computed from."""
     brighter_shading(view)
     planes = layers_from_exr((view / "radiance.exr").read_bytes())
     for name in planes:
@@ -126,7 +126,7 @@ def move_count(counts: dict) -> None:
 
 
 def turn_box(r: dict) -> None:
-    # Another frame, grown until it holds the old box.
+    # Another frame, enlarged until it encloses the old box.
     c, s = np.cos(0.3), np.sin(0.3)
     r["box3d"]["axes"] = (
         np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) @ r["box3d"]["axes"]
@@ -330,7 +330,7 @@ def pictures_of_eyes(view: Path) -> None:
 
 
 def light(change: Callable[[dict[str, np.ndarray]], object]) -> Plant:
-    """Change the planes of radiance.exr, and develop its pictures again, with their facts."""
+    """Change the planes of radiance.exr, and develop its pictures and facts again."""
 
     def plant(view: Path) -> None:
         planes = dict(layers_from_exr((view / "radiance.exr").read_bytes()))
@@ -343,7 +343,7 @@ def light(change: Callable[[dict[str, np.ndarray]], object]) -> Plant:
 
 
 def develop_again(view: Path) -> None:
-    """Develop radiance.exr again, with the facts in view.json and in the step's marker."""
+    """Develop radiance.exr again and update the facts in view.json and in the step's marker."""
     root = view.parents[3]
     recipe = recipe_from_json((root / "recipe.json").read_bytes(), "recipe.json")
     stored = radiance_from_exr((view / "radiance.exr").read_bytes(), "radiance.exr")
@@ -397,7 +397,7 @@ def exchange_lamps(view: Path) -> None:
     def change(planes: dict[str, np.ndarray]) -> None:
         for c in "RGB":
             swap_keys_of(planes, f"{first['layer']}.{c}", f"{second['layer']}.{c}")
-            # Their sum is in the order of their numbers, to the bit.
+            # Their sum is in the order of their numbers, exact to the bit.
             layers = [r["layer"] for r in rows if r["layer"]]
             total = np.zeros_like(planes[f"indoor.{c}"])
             for name in layers:
@@ -464,7 +464,7 @@ _FINISHED: dict[str, tuple[Plant, str]] = {
     "residual by day scaled": (exr("residual_outdoor.exr", scaled(1.1)), "intrinsic sum"),
     "shading brighter, residual darker": (brighter_shading, "shading"),
     "shading brighter, and the light that it is made of": (brighter_diffuse_light, "matte surfaces"),
-    "shading told that is not there": (
+    "missing shading in the table": (
         table(lambda t: t["modes"]["develop"].update(layers=["shading"])), "intrinsic layers",
     ),
     "source's class patched": (picture("class_source.png", patch(1)), "class_source"),
@@ -496,13 +496,13 @@ _FINISHED: dict[str, tuple[Plant, str]] = {
 
 
 _CAMERAS: dict[str, tuple[Plant, str]] = {
-    "another tone told": (
+    "tone changed in the table": (
         table(lambda t: t["modes"]["develop"]["variants"][0]["tone"].update(contrast=1.0)), "light developed",
     ),
-    "another camera told": (
+    "camera changed in the table": (
         table(lambda t: t["modes"]["develop"]["variants"][0].update(camera="none")), "light developed",
     ),
-    "a camera told where none was drawn": (
+    "a camera in the table without a draw": (
         table(lambda t: t["modes"]["develop"].update(tone={"contrast": 1.2})), "light developed",
     ),
     "a variant mirrored": (picture("mlt_il_ol.2.png", mirrored), "light developed"),
@@ -514,13 +514,13 @@ _CAMERAS: dict[str, tuple[Plant, str]] = {
 
 _FINISHED |= {
     # Facts of view.json that other files repeat, or that follow from others.
-    "another house told": (table(lambda t: t.update(house="elsewhere")), "facts"),
-    "another view told": (table(lambda t: t.update(view="0_1_1")), "facts"),
-    "another room told": (table(lambda t: t.update(room="0_1")), "camera file"),
-    "another sector told": (table(lambda t: t.update(sector=t["sector"] + 1)), "camera file"),
-    "another origin told": (table(lambda t: t.update(origin="stored")), "camera file"),
-    "another score told": (table(lambda t: t.update(score=t["score"] + 0.1)), "camera file"),
-    "another recipe told": (table(lambda t: t.update(recipe=t["recipe"][::-1])), "recipe"),
+    "house changed in the table": (table(lambda t: t.update(house="elsewhere")), "facts"),
+    "view changed in the table": (table(lambda t: t.update(view="0_1_1")), "facts"),
+    "room changed in the table": (table(lambda t: t.update(room="0_1")), "camera file"),
+    "sector changed in the table": (table(lambda t: t.update(sector=t["sector"] + 1)), "camera file"),
+    "origin changed in the table": (table(lambda t: t.update(origin="stored")), "camera file"),
+    "score changed in the table": (table(lambda t: t.update(score=t["score"] + 0.1)), "camera file"),
+    "recipe changed in the table": (table(lambda t: t.update(recipe=t["recipe"][::-1])), "recipe"),
     "a row's name": (row(lambda r: r.update(name="sofa")), "names"),
     "a row's kind": (row(lambda r: r.update(kind="object")), "names"),
     "a row's item": (row(lambda r: r.update(item="piece_99")), "names"),
@@ -528,17 +528,17 @@ _FINISHED |= {
     "a row's class13": (row(lambda r: r.update(class13="bed")), "names"),
     "a row's nyu13": (row(lambda r: r.update(nyu13=1)), "names"),
     "a row's source class": (row(lambda r: r.update(source_class="builtin#tv")), "names"),
-    "a row said to hang in the air": (row(lambda r: r.update(floating=True)), "names"),
-    "what stands said to hang in the air": (document("house.json", lambda h: next(i for i in h["items"] if i["kind"] == "object")["tags"].append("floating")), "floating"),
+    "a row marked as floating": (row(lambda r: r.update(floating=True)), "names"),
+    "a standing item marked as floating": (document("house.json", lambda h: next(i for i in h["items"] if i["kind"] == "object")["tags"].append("floating")), "floating"),
     "a row given a pose": (row(lambda r: r.update(model="m", world_from_model=np.eye(4).tolist(), camera_from_model_opencv=np.eye(4).tolist())), "model poses"),
     "two materials exchanged": (table(lambda t: t["materials"].update({"1": t["materials"]["2"], "2": t["materials"]["1"]})), "tables"),
     "a material's kind": (table(lambda t: t["materials"]["1"].update(kind="mirror")), "tables"),
     "a source class renamed": (table(lambda t: t["source_classes"].update({"1": "zebra"})), "tables"),
     "a corner of the room moved": (table(lambda t: t["layout"][0]["world"].__setitem__(0, 0.2)), "layout"),
     "a corner's pixel moved": (table(lambda t: next(r for r in t["layout"] if r["pixel"])["pixel"].__setitem__(0, 3.0)), "layout"),
-    "a hidden corner told to be seen": (table(lambda t: next(r for r in t["layout"] if not r["visible"]).update(visible=True)), "layout"),
+    "a hidden corner marked visible": (table(lambda t: next(r for r in t["layout"] if not r["visible"]).update(visible=True)), "layout"),
     "a layout without its ceiling": (table(lambda t: t.update(layout=t["layout"][: len(t["layout"]) // 2])), "layout"),
-    "warnings hushed up": (table(lambda t: t.update(warnings=["all is well"])), "light facts"),
+    "warnings replaced": (table(lambda t: t.update(warnings=["all is well"])), "light facts"),
     # Facts of light.
     "seed of light": (table(lambda t: t["modes"]["light"].update(seed=1)), "light facts"),
     "floor_lux": (table(lambda t: t["modes"]["light"]["floor_lux"].update(indoor=300.0)), "light facts"),
@@ -558,7 +558,7 @@ _FINISHED |= {
     ),
     "samples a pixel": (table(lambda t: t["modes"]["light"].update(spp=512)), "light facts"),
     "integrator": (table(lambda t: t["modes"]["light"].update(integrator="pssmlt-camera")), "light facts"),
-    "told to be denoised": (table(lambda t: t["modes"]["develop"].update(denoised=True)), "light facts"),
+    "marked as denoised": (table(lambda t: t["modes"]["develop"].update(denoised=True)), "light facts"),
     "weights of lamps": (table(lambda t: t["modes"]["light"]["lamp_weights"].update(piece_5=0.9)), "light facts"),
     "noise": (table(lambda t: t["modes"]["light"]["noise"].update(sum=0.01)), "histogram"),
     # Files of the house.
@@ -584,7 +584,7 @@ _FINISHED |= {
     "a material's texture": (document("house.json", lambda h: h["materials"][5].update(texture_id=h["textures"][1]["key"])), "materials"),
     "a material renamed": (document("house.json", lambda h: h["materials"][5].update(name="gold")), "materials"),
     "an opening turned": (document("house.json", lambda h: h["openings"][0].update(normal=[0.0, 0.0, 1.0])), "openings"),
-    "a window told to be a door": (document("house.json", lambda h: next(o for o in h["openings"] if o["is_window"]).update(is_window=False)), "openings"),
+    "a window marked as a door": (document("house.json", lambda h: next(o for o in h["openings"] if o["is_window"]).update(is_window=False)), "openings"),
     "a light moved": (document("house.json", lambda h: next(i for i in h["items"] if i["lights"])["lights"][0]["position"].__setitem__(1, 0.2)), "lights"),
     "a light's escape": (document("house.json", lambda h: next(i for i in h["items"] if i["id"] == "piece_5")["lights"][0].update(escape=0.9)), "lights"),
     "a licence changed": (document("house.json", lambda h: h["source"].update(licence="CC0")), "credits"),
@@ -595,7 +595,7 @@ _FINISHED |= {
     "a surface of another material": (glb(lambda h: h["meshes"][10]["primitives"][0].update(material=3)), "house items"),
     "a material of house.glb painted": (glb(lambda h: h["materials"][4]["pbrMetallicRoughness"].update(baseColorFactor=[0.9, 0.1, 0.1, 1.0])), "materials"),
     "area of a room in repair.json": (document("repair.json", lambda h: h["rooms"][0].update(floor_area_m2=12.0)), "rooms"),
-    "a room told to be open": (document("repair.json", lambda h: h["rooms"][0].update(enclosure="open")), "rooms"),
+    "a room marked as open": (document("repair.json", lambda h: h["rooms"][0].update(enclosure="open")), "rooms"),
     "a field of the recipe": (document("recipe.json", lambda h: h["repair"].update(wall_thickness_m=0.2)), "recipe"),
     "the recipe's tone": (document("recipe.json", lambda h: h["tone"].update(key=0.25)), "light developed"),
     "seed of the recipe": (document("recipe.json", lambda h: h.update(seed=3)), "recipe"),
@@ -614,7 +614,7 @@ _FILM: dict[str, tuple[Plant, str]] = {
     "time of a frame": (table(lambda t: t.update(time_s=t["time_s"] + 0.02)), "camera file"),
     "times of all frames": (document("cameras.json", lambda h: [v.update(time_s=2 * v["time_s"]) for v in h["views"]]), "sequence"),
     "number of a frame": (table(lambda t: t.update(frame=t["frame"] + 1)), "camera file"),
-    "another next frame told": (table(lambda t: t["partners"]["next"].update(view="frame_00009")), "partners"),
+    "next frame changed": (table(lambda t: t["partners"]["next"].update(view="frame_00009")), "partners"),
     "time of the next frame": (table(lambda t: t["partners"]["next"].update(time_s=0.5)), "partners"),
     "pose of the next frame": (table(lambda t: t["partners"]["next"]["world_from_camera_opencv"][0].__setitem__(3, 0.0)), "partners"),
     "rolling shutter's time": (document("recipe.json", lambda h: h["blur"].update(rolling_s=0.001)), "recipe"),
@@ -627,7 +627,7 @@ _FILM: dict[str, tuple[Plant, str]] = {
 
 _PAIR: dict[str, tuple[Plant, str]] = {
     "disparity scaled": (picture("disparity.png", scaled(1.05)), "motion: disparity"),
-    "the other eye told": (table(lambda t: t["partners"]["stereo"].update(view="0_1_0")), "partners"),
+    "eye changed": (table(lambda t: t["partners"]["stereo"].update(view="0_1_0")), "partners"),
     "K of the other eye": (table(lambda t: t["partners"]["stereo"]["K"][0].__setitem__(0, 99.0)), "partners"),
     "the base line": (document("recipe.json", lambda h: h["cameras"].update(stereo_m=0.12)), "sequence"),
     "the eyes of a pair exchanged": (eyes_exchanged, "sequence"),
@@ -652,7 +652,7 @@ _EDITED: dict[str, tuple[Plant, str]] = {
     "both poses and house.json's moved": (
         both(placed(pose_and_what_follows), document("house.json", lambda h: moved("world_from_model", 0.5)(next(i for i in h["items"] if i["pose"])["pose"]))), "model poses",
     ),
-    "another model told": (placed(lambda r: r.update(model="teapot")), "model poses"),
+    "model changed": (placed(lambda r: r.update(model="teapot")), "model poses"),
     "a model's pose left out": (placed(lambda r: [r.pop(k) for k in ("model", "world_from_model", "camera_from_model_opencv")]), "model poses"),
     "nocs mirrored": (picture("nocs.png", lambda a: np.where(a.any(-1, keepdims=True), 65535 - a, 0)), "ray: nocs"),
 }  # fmt: skip
@@ -693,20 +693,20 @@ _OPENED: dict[str, tuple[Plant, str]] = {
     "a point of its axis": (parts(lambda r: r["point_opencv"].__setitem__(2, 9.0)), "articulation"),
     "how far a part is open": (parts(lambda r: r.update(value=0.1)), "articulation"),
     "the limit of a part": (parts(lambda r: r.update(upper=3.0)), "articulation"),
-    "what a part weighs": (parts(lambda r: r.update(mass_kg=1.0)), "articulation"),
+    "mass of a part": (parts(lambda r: r.update(mass_kg=1.0)), "articulation"),
     "a part of another item": (parts(lambda r: r.update(item="piece_1")), "articulation"),
     "pixels of a part": (parts(lambda r: r.update(pixels=r["pixels"] + 1)), "articulation"),
     "box of a part": (parts(lambda r: r["box2d"].__setitem__(0, 0)), "articulation"),
     "a door of house.json beyond its limit": (joint(lambda j: j.update(value=2.5)), "joints"),
     "a hinge of house.json elsewhere": (joint(lambda j: j["point"].__setitem__(0, 20.0)), "joints"),
-    "an axis of house.json that is none": (joint(lambda j: j.update(axis=[0.0, 2.0, 0.0])), "joints"),
+    "an invalid axis in house.json": (joint(lambda j: j.update(axis=[0.0, 2.0, 0.0])), "joints"),
     "another kind of joint": (joint(lambda j: j.update(kind="ball")), "joints"),
     "a part of house.glb renamed": (moving(lambda p: p["extras"].update(part="lid 1")), "joints"),
-    "a part of house.glb told still": (moving(lambda p: p.pop("extras")), "joints"),
+    "a part of house.glb marked static": (moving(lambda p: p.pop("extras")), "joints"),
 }  # fmt: skip
 
 _FINISHED |= {
-    # Light that is not what the labels show, developed again.
+    # Light that contradicts the labels, developed again.
     "radiance of another view": (of_other_view(with_guides=True), "light guides"),
     "light of another view": (of_other_view(with_guides=False), "light edges"),
     "light mirrored, developed": (each(mirrored), "light edges"),
@@ -744,13 +744,13 @@ _PAIR |= {"pictures of the eyes exchanged": (pictures_of_eyes, "light guides")}
 
 _SUN: dict[str, tuple[Plant, str]] = {
     "light of another hour": (of_another_hour, "sun"),
-    "the sun told elsewhere": (
+    "the sun moved in the table": (
         table(lambda t: t["modes"]["light"]["sky"].update(sun_direction=[0.224144, 0.5, 0.836516])), "sun",
     ),
 }  # fmt: skip
 
 _SENSOR: dict[str, tuple[Plant, str]] = {
-    "another camera told of a picture": (table(lambda t: t["modes"]["develop"].update(camera="none")), "light developed"),
+    "camera of a picture changed": (table(lambda t: t["modes"]["develop"].update(camera="none")), "light developed"),
     "gains of a sensor": (table(lambda t: t["modes"]["develop"]["mlt_ol"].update(gains=[1.0, 1.0, 1.0])), "light developed"),
     "ISO of a sensor": (table(lambda t: t["modes"]["develop"]["mlt_ol"].update(iso=12345.0)), "light developed"),
     "shutter of a sensor": (table(lambda t: t["modes"]["develop"]["mlt_ol"].update(shutter_s=7.0)), "light developed"),
@@ -771,7 +771,7 @@ FALSEHOODS: dict[str, dict[str, tuple[Plant, str]]] = {
 
 
 def planted(root: Path, sort: str, kind: str) -> set[str]:
-    """The checks that fail once a falsehood is planted in a root of that sort, with its hashes mended."""
+    """The failing checks after a falsehood is planted in a root of that sort, with its hashes updated."""
     plant, _check = FALSEHOODS[sort][kind]
     plant(view_of(root))
     sign(root, house_of(root))

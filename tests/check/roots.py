@@ -1,4 +1,4 @@
-"""A finished output root with labels of the small home, as a run writes it (no light, no GL)."""
+"""A finished output root with labels of the small home, like that of a run (no light, no GL)."""
 
 import json
 from collections.abc import Callable
@@ -24,18 +24,18 @@ SIZE = (128, 96)
 
 
 def views_of(home: House) -> dict[str, Camera]:
-    """The home's stored cameras, small."""
+    """The home's stored cameras at a small size."""
     intrinsics = Intrinsics.from_hfov(*SIZE)
     return {f"v{k}": Camera.look(intrinsics, c.eye, c.towards) for k, c in enumerate(home.cameras)}
 
 
 def all_layers() -> tuple[str, ...]:
-    """Every optional layer of the package itself."""
+    """Every optional layer of the package."""
     return tuple(x.name for x in OWN_LAYERS if x.name in OPTIONAL)
 
 
 def encoded(name: str, array: np.ndarray) -> bytes:
-    """A layer's file."""
+    """The bytes of a layer's file."""
     if LAYER[name].file.endswith(".png"):
         return png_from_array(array)
     names = LAYER[name].channels.split()
@@ -51,7 +51,7 @@ def make_root(
     with_optional: bool = False,
     caster: Caster | None = None,
 ) -> Path:
-    """Write the root and return its house folder; of the small home when none is given."""
+    """Write the root and return its house folder; by default of the small home."""
     home = home or builtin_home()
     house = root / "houses" / home.id
     geometry = geometry_from_house(home)

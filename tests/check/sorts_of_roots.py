@@ -33,7 +33,7 @@ def rendered(
     word: str, words: Mapping[str, str] | None = None, *, n_views: int = 1,
     layers: tuple[str, ...] | None = None, pairs: bool = False,
 ) -> Make:  # fmt: skip
-    """Makes a root of one home in all modes, with every layer that it can have."""
+    """Render a root of one home in all modes, with every possible layer."""
 
     def make(root: Path) -> None:
         recipe = recipe_from_name("preview", _SMALL | dict(words or {}))
@@ -47,7 +47,7 @@ def rendered(
 
 
 def _edited(root: Path) -> None:
-    """Things placed, moved and painted, with poses and model coordinates."""
+    """Items placed, moved and painted, with poses and model coordinates."""
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         home = small_home().set(**{"light.spp": 4, "light.denoise": False})

@@ -1,4 +1,4 @@
-"""A leaf that crosses its frame: where both lie at one depth a ray may meet either."""
+"""A leaf that crosses its frame: at equal depth a ray may hit either."""
 
 from types import SimpleNamespace
 
@@ -9,7 +9,7 @@ from pbrs_farm.check.embree_caster import Rays
 from pbrs_farm.check.pixel_checks import of_another_part
 
 
-def test_of_two_that_cross_the_other_is_found_on_their_line_alone() -> None:
+def test_of_two_crossing_surfaces_the_other_is_accepted_only_on_their_line() -> None:
     # A frame across the axis at 2 m, and a leaf at 45 degrees that crosses it at x = 0.
     frame = [(-1, -1, -2), (1, -1, -2), (0, 2, -2)]
     leaf = [(-1, -1, -3), (1, -1, -1), (0, 2, -2)]

@@ -25,11 +25,11 @@ from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.check.roots import failed, make_root, views_of
 
-DISTANCES_M = (0.4, 0.45, 0.7)  # of the screens from the first camera
+DISTANCES_M = (0.4, 0.45, 0.7)  # from the first camera to the screens
 
 
 def screened(material: Material) -> House:
-    """The small home, three screens with holes before its first camera."""
+    """The small home with three perforated screens in front of its first camera."""
     rng = np.random.default_rng(2)
     pixels = np.full((6, 9, 4), 120, np.uint8)
     pixels[..., 3] = rng.integers(0, 256, (6, 9))
@@ -70,7 +70,7 @@ MATERIALS = {
 
 @pytest.mark.quick(1)
 @pytest.mark.parametrize("name", MATERIALS)
-def test_every_layer_of_a_home_with_holes_is_as_its_own_rays_find_it(
+def test_every_layer_of_a_home_with_holes_agrees_with_independent_rays(
     tmp_path: Path, name: str
 ) -> None:
     home = screened(MATERIALS[name])

@@ -27,7 +27,7 @@ KINDS = [(sort, kind) for sort, kinds in FALSEHOODS.items() for kind in kinds]
 
 
 def _one_a_check() -> list[tuple[str, str]]:
-    """The first kind of falsehood that each check must find in each sort of root."""
+    """One kind of falsehood for each check and sort of root."""
     first: dict[tuple[str, str], str] = {}
     for sort, kind in KINDS:
         first.setdefault((sort, FALSEHOODS[sort][kind][1]), kind)
@@ -43,14 +43,14 @@ SORTS = [pytest.param(sort, marks=_marked(sort)) for sort in FALSEHOODS]
 
 @pytest.fixture(scope="module")
 def finished_root(tmp_path_factory: pytest.TempPathFactory) -> Root:
-    """A root of a sort, made when it is first asked for."""
-    made: dict[str, Path] = {}
+    """A root of a sort, rendered at its first use."""
+    roots: dict[str, Path] = {}
 
     def root(sort: str) -> Path:
-        if sort not in made:
-            made[sort] = tmp_path_factory.mktemp("sorts") / sort
-            ROOTS[sort](made[sort])
-        return made[sort]
+        if sort not in roots:
+            roots[sort] = tmp_path_factory.mktemp("sorts") / sort
+            ROOTS[sort](roots[sort])
+        return roots[sort]
 
     return root
 
@@ -61,7 +61,7 @@ def test_a_true_root_is_clean(finished_root: Root, sort: str) -> None:
     assert certificate.is_clean, certificate.text()
 
 
-def test_a_certificate_says_what_was_looked_at(finished_root: Root) -> None:
+def test_a_certificate_lists_the_examined_files(finished_root: Root) -> None:
     root = finished_root("finished")
     certificate = verify(root, sample=10)
     text = certificate.text()
@@ -112,7 +112,7 @@ def test_further_pictures_by_other_cameras_are_developed_again(finished_root: Ro
 def test_a_true_root_of_dark_pictures_is_clean_by_its_tiles(finished_root: Root) -> None:
     certificate = verify(finished_root("dark"), sample=10)
     assert certificate.is_clean, certificate.text()
-    # The first view is denoised at its full size, the second at half of it: both modes and a variant.
+    # The first view is denoised at full size, the second at half: both modes and a variant.
     assert certificate.counts["light by tiles"].checked == 3
     assert any(
         line.startswith("light of 1 views was denoised again") for line in certificate.not_looked_at
@@ -121,7 +121,7 @@ def test_a_true_root_of_dark_pictures_is_clean_by_its_tiles(finished_root: Root)
 
 @pytest.mark.long
 @pytest.mark.parametrize("file", ["mlt_ol.png", "mlt_il_ol.png", "mlt_il_ol.1.png"])
-def test_a_patch_is_found_where_light_is_denoised_at_half_its_size(
+def test_a_patch_is_found_in_light_denoised_at_half_its_size(
     finished_root: Root, tmp_path: Path, file: str
 ) -> None:
     root = Path(shutil.copytree(finished_root("dark"), tmp_path / "root"))
@@ -131,7 +131,7 @@ def test_a_patch_is_found_where_light_is_denoised_at_half_its_size(
     (view / file).write_bytes(png_from_array(picture))
     sign(root, house_of(root))
     certificate = verify(root, sample=10)
-    # It differs at half its size, so its full size is compared.
+    # It differs at half its size, so the full size is compared.
     assert "light by tiles" not in certificate.counts
     (fault,) = (line for line in certificate.failures if line.startswith("light developed"))
     assert f"{file}: " in fault
@@ -139,10 +139,10 @@ def test_a_patch_is_found_where_light_is_denoised_at_half_its_size(
 
 
 @pytest.mark.long
-def test_a_doubt_at_half_the_size_is_settled_as_the_light_stands(
+def test_a_doubt_at_half_size_is_settled_at_full_size(
     finished_root: Root, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # As where a median turns on which half of the pixels is lit: gains that no halved light gives.
+    # As if a median depended on which half of the pixels is lit: gains that no halved light gives.
     halved = developing.white_balance
 
     def elsewhere(total: NDArray[Any], *words: Any, **named: Any) -> Any:
@@ -155,7 +155,7 @@ def test_a_doubt_at_half_the_size_is_settled_as_the_light_stands(
 
 
 @pytest.mark.long
-def test_a_damaged_variant_is_one_fault_and_the_rest_goes_on(
+def test_a_damaged_variant_is_one_fault_and_the_others_are_checked(
     finished_root: Root, tmp_path: Path
 ) -> None:
     root = Path(shutil.copytree(finished_root("dark"), tmp_path / "root"))
@@ -177,7 +177,7 @@ def test_every_stored_field_and_layer_has_an_owner(finished_root: Root, sort: st
     assert methods.unowned_layers() == []
 
 
-def test_a_new_field_and_a_new_layer_are_told_of_as_not_looked_at(
+def test_a_new_field_and_a_new_layer_are_listed_as_unexamined(
     finished_root: Root, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     root = Path(shutil.copytree(finished_root("finished"), tmp_path / "root"))

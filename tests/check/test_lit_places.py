@@ -1,4 +1,4 @@
-"""Light that a coated surface reflects, as `verify` expects it, against the model of docs/light_methods.md."""
+"""Light reflected by a coated surface, as `verify` expects it, against the model of docs/light_methods.md."""
 
 from __future__ import annotations
 
@@ -7,12 +7,12 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from pbrs_farm.check.lit_checks import _Places
+from pbrs_farm.check.lit_checks import LitPlaces
 from pbrs_farm.check.radiance_checks import coated_materials
 
 
-def _seen(albedo: float, to_light: float, to_camera: float) -> float:
-    """Radiance over that of a matt surface of the same albedo, of which a coat of F0 0.04 is a part."""
+def _expected_radiance(albedo: float, to_light: float, to_camera: float) -> float:
+    """Radiance relative to a matt surface of the same albedo, including a coat of F0 0.04."""
     kd, f0 = albedo - 0.04, 0.04
 
     def through(cosine: float) -> float:
@@ -29,14 +29,14 @@ def test_a_coated_ceiling_seen_at_a_slant_sends_less_back(
 ) -> None:
     ones, none = np.ones(1), np.zeros((1, 3))
     painted = ones * 0.96 * (1 - 0.04 / albedo)
-    places = _Places(
+    places = LitPlaces(
         np.zeros(1, int), np.zeros(1, int), none, none, none[None], painted, ones * to_camera
     )
-    expected = min(_seen(albedo, to_light, to_camera), 1)
+    expected = min(_expected_radiance(albedo, to_light, to_camera), 1)
     assert places.returned(ones * to_light)[0] == pytest.approx(expected, rel=1e-3)
 
 
-def test_a_roughness_makes_a_coat_and_a_colour_without_shine_none() -> None:
+def test_roughness_makes_a_coat_and_a_colour_without_shine_does_not() -> None:
     dull = {
         "roughness": None, "roughness_texture_id": None, "shininess": 40.0,
         "specular": [0.0, 0.0, 0.0],

@@ -21,7 +21,7 @@ GLOSSY = (
 
 
 def mirrored_home() -> House:
-    """The small home: what covers most walls is a mirror, all else has one gloss after the other."""
+    """The small home with mirrors as most wall covers and different gloss on everything else."""
     home = builtin_home()
     walls = {s.material for i in home.items if i.kind.value == "wall" for s in i.surfaces}
     materials = []
@@ -43,7 +43,7 @@ def mirrored(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return root
 
 
-def test_what_mirrors_show_is_recomputed_to_the_last_pixel(mirrored):
+def test_mirror_images_are_recomputed_to_the_last_pixel(mirrored):
     views = house_of(mirrored) / "views"
     pictures = {
         name: np.stack([array_from_png((v / f"{name}.png").read_bytes()) for v in views.iterdir()])

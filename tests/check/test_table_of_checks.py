@@ -1,4 +1,4 @@
-"""The table of checks: a module is all that a new check takes, and each of its entries is planted against."""
+"""The table of checks: a new check needs one module, and each entry has a planted falsehood."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ CHECKS = (
 
 
 @pytest.mark.kinds("check")
-def test_a_file_is_all_that_a_new_check_takes_beside_its_falsehood(
+def test_a_new_check_needs_one_file_and_its_falsehood(
     root: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "checks").mkdir()

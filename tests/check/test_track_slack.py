@@ -1,4 +1,4 @@
-"""Tolerance of a tracked point's place: the error of 32-bit floats of vertices and places, and no more."""
+"""Tolerance of a tracked point's place: exactly the error of 32-bit floats."""
 
 import numpy as np
 import pytest
@@ -17,5 +17,5 @@ def test_a_vertex_of_32_bits_moves_a_place_by_less_than_is_allowed(depth_m: floa
     assert (np.abs(stored - exact).max(1) <= place_slack_px(exact, depth)).all()
 
 
-def test_a_point_before_the_camera_that_is_a_twentieth_of_a_pixel_off_is_told() -> None:
+def test_a_point_a_twentieth_of_a_pixel_off_is_reported() -> None:
     assert place_slack_px(np.array([[320.0, 240.0]]), np.array([1.0]))[0] < 0.05

@@ -9,7 +9,7 @@ from pbrs_farm.core.errors import BadInput
 from tests.check.roots import changed_pixel, failed, house_of
 
 
-def test_one_changed_pixel_is_caught_by_its_hash_without_looking_at_pixels(root):
+def test_one_changed_pixel_changes_its_hash(root):
     changed_pixel(house_of(root) / "views/v0/depth.png", 48, 64, 1)
     certificate = verify(root, sample=0)
     assert certificate.counts["hashes"].failed == 1
@@ -21,7 +21,7 @@ def _sparse(path: Path) -> None:
         file.truncate(5 * 2**30)
 
 
-def test_a_missing_file_and_an_unlisted_one_are_caught(root):
+def test_missing_and_unlisted_files_are_reported(root):
     view = house_of(root) / "views/v0"
     (view / "normal.png").unlink()
     (view / "stray.txt").write_text("?")
@@ -73,12 +73,12 @@ def test_pipes_devices_and_giants_in_a_root_are_failures_that_cost_nothing(root,
     assert check in failed(root, all_pixels=False)
 
 
-def test_a_pipe_for_the_lux_of_rooms_is_as_none(root):
+def test_a_pipe_for_the_lux_of_rooms_counts_as_missing(root):
     os.mkfifo(house_of(root) / "illuminance.json")
     assert not failed(root, all_pixels=False)
 
 
-def test_one_damaged_view_json_costs_its_own_view_alone(root):
+def test_one_damaged_view_json_costs_only_its_view(root):
     (house_of(root) / "views/v0/view.json").write_text("[" * 100_000)
     certificate = verify(root, sample=10)
     assert certificate.n_views == 1
@@ -99,7 +99,7 @@ def test_markers_that_disagree_with_the_manifest_are_caught(root):
     assert failed(root, all_pixels=False) == {"markers"}
 
 
-def test_a_folder_that_is_no_output_root_is_told_so(tmp_path):
+def test_a_folder_that_is_no_output_root_is_refused(tmp_path):
     with pytest.raises(BadInput, match="no houses here"):
         verify(tmp_path)
 

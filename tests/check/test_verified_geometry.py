@@ -44,7 +44,7 @@ def test_a_wrong_focal_length_is_caught(root):
     assert "ray: depth" in failed(root)
 
 
-def test_two_views_of_one_room_must_agree_where_things_are(tmp_path):
+def test_two_views_of_one_room_must_agree_on_places(tmp_path):
     home = builtin_home()
     eye, intrinsics = home.cameras[0].eye, Intrinsics.from_hfov(*SIZE)
     towards = home.cameras[0].towards
@@ -99,7 +99,7 @@ def test_normals_in_another_frame_do_not_fit_the_depth(root):
 
 
 def with_frame_in_wall(by_m: float) -> House:
-    """The small home with a sheet before every wall's larger faces, by_m off their plane."""
+    """The small home with a sheet in front of every wall's larger faces, by_m off their plane."""
     home = builtin_home()
     frames = []
     for item in home.items:
@@ -125,7 +125,7 @@ def with_frame_in_wall(by_m: float) -> House:
 
 @pytest.mark.long
 @pytest.mark.parametrize("by_m", [0.0, 2e-5])
-def test_coincident_surfaces_of_the_source_are_told_by_pairs_and_no_failure(tmp_path, by_m):
+def test_coincident_surfaces_of_the_source_are_reported_in_pairs_without_failure(tmp_path, by_m):
     make_root(tmp_path, with_frame_in_wall(by_m), with_optional=True)
     certificate = verify(tmp_path, all_pixels=True)
     assert certificate.is_clean, certificate.text()
@@ -138,7 +138,7 @@ def test_coincident_surfaces_of_the_source_are_told_by_pairs_and_no_failure(tmp_
         assert f"{pair.items[0]} and {pair.items[1]}: {pair.pixels}" in certificate.text()
 
 
-def test_a_wrong_item_on_a_surface_of_its_own_still_fails(root):
+def test_a_wrong_item_on_a_single_surface_still_fails(root):
     changed_pixel(house_of(root) / "views/v0/instance.png", 48, 64, 1)
     sign(root, house_of(root))
     assert not verify(root, all_pixels=True).is_clean
@@ -147,7 +147,7 @@ def test_a_wrong_item_on_a_surface_of_its_own_still_fails(root):
 
 @pytest.mark.long
 @pytest.mark.parametrize(("by_m", "coincide"), [(0.0, True), (5e-4, False)])
-def test_parts_of_one_thing_in_one_plane_and_two_colours_are_told(tmp_path, by_m, coincide):
+def test_coplanar_parts_of_one_item_in_two_colours_are_reported(tmp_path, by_m, coincide):
     home = builtin_home()
     framed = with_frame_in_wall(by_m)
     frames = {i.id.removeprefix("frame_"): i for i in framed.items if i.id.startswith("frame_")}
@@ -159,7 +159,7 @@ def test_parts_of_one_thing_in_one_plane_and_two_colours_are_told(tmp_path, by_m
         items.append(replace(item, surfaces=(*item.surfaces, *parts)))
     make_root(tmp_path, home.with_items(items))
     certificate = verify(tmp_path, all_pixels=True)
-    # Instance, depth and normal are right by either: only the colour is a throw of dice.
+    # Instance, depth and normal are right for both: only the colour is arbitrary.
     assert certificate.is_clean, certificate.text()
     listed = [c.items[0] for c in certificate.coincident if c.items[0] == c.items[1]]
     assert bool(listed) == coincide
@@ -188,7 +188,7 @@ def test_model_coordinates_are_recomputed(tmp_path):
     posed = np.isin(instance, [r["id"] for r in rows if "model" in r])
     assert (label.any(-1) == posed).all()
     assert posed.sum() > 500
-    # A tenth of a model beside, and a point off any model.
+    # A tenth of a model off, and a point off any model.
     for place, value in ((posed, 6000), (~posed, 1)):
         wrong = label.astype(int)
         row, column = np.argwhere(place)[7]

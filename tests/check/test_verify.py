@@ -20,7 +20,7 @@ def test_a_finished_folder_is_clean_to_the_last_pixel(clean):
     assert certificate.text().endswith("\nCLEAN")
 
 
-def test_a_sample_checks_as_many_pixels_as_asked(clean):
+def test_a_sample_checks_the_requested_number_of_pixels(clean):
     assert verify(clean, sample=100).counts["ray: normal"].checked == 200
 
 
@@ -36,7 +36,7 @@ def test_a_sample_checks_as_many_pixels_as_asked(clean):
         ("boundary.png", 1, "boundary"),
     ],
 )
-def test_one_changed_pixel_is_caught_though_the_hashes_agree(root, file, by, check):
+def test_one_changed_pixel_is_caught_even_if_the_hashes_agree(root, file, by, check):
     changed_pixel(house_of(root) / "views/v0" / file, 48, 64, by)
     sign(root, house_of(root))
     assert check in failed(root)
@@ -64,7 +64,7 @@ def rich(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return root
 
 
-def test_optional_layers_are_checked_where_they_exist(rich):
+def test_optional_layers_are_checked_if_they_exist(rich):
     certificate = verify(rich, all_pixels=True)
     assert certificate.is_clean, certificate.text()
     names = {"ray: depth_z", "ray: position", "ray: normal_world", "ray: material", "ray: glass"}
@@ -110,7 +110,7 @@ def test_one_changed_pixel_of_an_optional_layer_is_caught(rich, tmp_path, file, 
     assert check in failed(tmp_path / "root")
 
 
-def test_a_black_picture_by_outdoor_light_is_noted_and_one_by_opengl_fails(root):
+def test_a_black_picture_is_noted_by_outdoor_light_and_fails_by_opengl(root):
     black = png_from_array(np.zeros((SIZE[1], SIZE[0], 3), np.uint8))
     house = house_of(root)
     for name in ("mlt_ol.png", "opengl_dl.png"):

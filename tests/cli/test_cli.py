@@ -1,4 +1,4 @@
-"""The command line: wrong words and wrong files end in one clear line and a non-zero exit."""
+"""The command line: wrong arguments and files end in one clear line and a non-zero exit."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def zipped(path: Path, **entries: str) -> Path:
         (["step", "paint", "builtin", "--out", "{out}"], "no such step"),
     ],
 )
-def test_wrong_words_are_told(
+def test_wrong_arguments_are_reported(
     words: list[str], says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = str(tmp_path / "out")
@@ -77,7 +77,7 @@ def test_wrong_words_are_told(
         ("cut.glb", b"glTF\x02\x00\x00\x00", "cut.glb"),
     ],
 )
-def test_a_bad_home_is_named_and_the_next_one_is_done(
+def test_a_bad_home_is_named_and_the_next_one_is_processed(
     name: str, content: bytes, says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     home = tmp_path / name
@@ -86,7 +86,7 @@ def test_a_bad_home_is_named_and_the_next_one_is_done(
     assert says in error
 
 
-def test_a_home_without_home_xml_says_how_to_save_it(
+def test_a_home_without_home_xml_explains_how_to_save_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     home = zipped(tmp_path / "old.sh3d", Home="java", ContentDigests="")
@@ -102,7 +102,7 @@ def test_every_verb_has_a_help_line() -> None:
 def test_layers_prints_the_table(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["layers"]) == 0
     printed = capsys.readouterr().out
-    hidden = {f"mlt_il_ol.{n}" for n in range(2, MOST_VARIANTS)}  # in a row with the first and last
+    hidden = {f"mlt_il_ol.{n}" for n in range(2, MOST_VARIANTS)}  # between the first and the last
     assert all(f"`{layer.file}`" in printed for layer in LAYERS if layer.name not in hidden)
 
 
@@ -127,7 +127,7 @@ def test_a_limit_below_nothing_is_rejected_by_its_name(
     assert f"{option}: -1.0: expected 0 or more" in capsys.readouterr().err
 
 
-def test_a_process_over_the_memory_that_was_asked_for_is_killed(
+def test_a_process_over_the_requested_memory_is_killed(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["run", "builtin", "--out", str(tmp_path), "--memory", "1"]) == 1

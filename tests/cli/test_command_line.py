@@ -1,4 +1,4 @@
-"""Slips are offered near names, options stand where they like, the help is grouped, shells complete."""
+"""The command line: suggestions for misspelt names, free order of options, a grouped help, completion."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ EVERY_VERB = [verb for verbs in MODULES.values() for verb in verbs]
 
 
 def refusal(capsys: pytest.CaptureFixture[str], *words: str, code: int) -> str:
-    """What a command that ends with the code writes to standard error."""
+    """Standard error of a command that ends with the code."""
     try:
         ended: object = main(list(words))
     except SystemExit as ending:
@@ -53,7 +53,7 @@ def refusal(capsys: pytest.CaptureFixture[str], *words: str, code: int) -> str:
         (["step", "develp", "builtin", "--out", "x"], "did you mean develop?", 1),
     ],
 )
-def test_a_slip_is_offered_what_it_may_mean(
+def test_a_misspelling_is_answered_with_suggestions(
     words: list[str], says: str, code: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert says in refusal(capsys, *words, code=code)
@@ -77,7 +77,7 @@ def ordered(words: str) -> str:
     [
         ("--debug run A --out o", "run --debug A --out o"),
         ("--recipe preview --out o run A", "run --recipe preview --out o A"),
-        ("--out run run A", "run --out run A"),  # a folder that has a verb's name
+        ("--out run run A", "run --out run A"),  # a folder with a verb's name
         ("--out=run run A", "run --out=run A"),
         ("--modes opengl_dl opengl_il run A --out o", "run --modes opengl_dl opengl_il A --out o"),
         ("--help run", "run --help"),
@@ -88,7 +88,7 @@ def ordered(words: str) -> str:
         ("", ""),
     ],
 )
-def test_options_stand_before_the_verb_or_after_it(words: str, means: str) -> None:
+def test_options_are_valid_before_or_after_the_verb(words: str, means: str) -> None:
     assert ordered(words) == means
 
 
@@ -99,7 +99,7 @@ def test_an_option_before_the_verb_works_as_behind_it(capsys: pytest.CaptureFixt
     assert capsys.readouterr().out == before
 
 
-def test_the_help_lists_each_verb_once_below_what_it_is_for() -> None:
+def test_the_help_lists_each_verb_once_in_its_group() -> None:
     text = build_parser().format_help()
     for title in {row.group for row in VERBS.values()}:
         assert f"\n{title}:" in text
@@ -107,7 +107,7 @@ def test_the_help_lists_each_verb_once_below_what_it_is_for() -> None:
         assert len(re.findall(rf"^  {verb}\b", text, re.MULTILINE)) == 1, verb
 
 
-def test_a_recipe_file_changes_what_it_names(tmp_path: Path) -> None:
+def test_a_recipe_file_changes_only_its_fields(tmp_path: Path) -> None:
     file = tmp_path / "mine.toml"
     file.write_text('recipe = "preview"\nseed = 3\n\n[light]\nspp = 8\n')
     words = ["cameras", "x", "--recipe", str(file), "--set", "image.width_px=64"]
@@ -150,7 +150,7 @@ def test_a_bad_recipe_file_is_named_with_its_place(
 
 
 def completed(words: Sequence[str]) -> set[str]:
-    """What bash offers for the last of the words."""
+    """Completions that bash offers for the last word."""
     script = completion_script("bash", build_parser().verbs())
     array = " ".join(f"'{word}'" for word in words)
     ask = f"{script}\nCOMP_WORDS=({array}); COMP_CWORD={len(words) - 1}; _pbrs_farm"
@@ -172,9 +172,9 @@ def completed(words: Sequence[str]) -> set[str]:
     ],
 )
 def test_bash_completes_verbs_options_and_their_choices(words: str, offers: set[str]) -> None:
-    found = completed(words.split())
-    assert offers <= found
-    assert all(word.startswith(words.split()[-1]) for word in found)
+    completions = completed(words.split())
+    assert offers <= completions
+    assert all(word.startswith(words.split()[-1]) for word in completions)
 
 
 @pytest.mark.parametrize("shell", SHELLS)
@@ -202,7 +202,7 @@ def test_every_shell_gets_a_script_of_every_verb(
         (["--doors", "ajar"], "--doors"),
     ],
 )
-def test_what_no_view_could_be_made_of_is_refused_before_anything_is_stored(
+def test_an_impossible_request_is_refused_before_anything_is_stored(
     options: list[str],
     words: str,
     tmp_path: Path,

@@ -1,4 +1,4 @@
-"""`homes make` as a user types it: files, a page of plans, one line for what cannot be made."""
+"""`homes make` on the command line: files, a page of plans, one line for an impossible home."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pbrs_farm.cli import main
 
 
 def refused(capsys: pytest.CaptureFixture[str], *words: object) -> str:
-    """What a command says that ends with a fault: one line."""
+    """The single line of a command that fails."""
     capsys.readouterr()
     assert main(["homes", "make", *map(str, words)]) != 0
     lines = [x for x in capsys.readouterr().err.splitlines() if x]
@@ -26,11 +26,11 @@ def test_homes_and_their_plans_are_made_and_a_second_call_keeps_them(
     assert main(words) == 0
     names = {p.name for p in tmp_path.iterdir()}
     assert names == {"made-1.sh3d", "made-1.svg", "made-2.sh3d", "made-2.svg", "plans.html"}
-    # On a slow machine a line says how far it is before.
+    # On a slow machine a line of progress comes first.
     assert capsys.readouterr().out.splitlines()[-1].startswith("2 homes made in ")
     assert main(words) == 0
-    assert "0 homes made" in (said := capsys.readouterr().out)
-    assert "2 kept" in said
+    assert "0 homes made" in (output := capsys.readouterr().out)
+    assert "2 kept" in output
 
 
 def test_a_programme_file_names_the_rooms(tmp_path: Path) -> None:
@@ -42,7 +42,7 @@ def test_a_programme_file_names_the_rooms(tmp_path: Path) -> None:
     assert "Ada" in (tmp_path / "flats/made-1.svg").read_text()
 
 
-def test_a_plan_of_ones_own_becomes_a_home_of_its_name(tmp_path: Path) -> None:
+def test_a_users_plan_becomes_a_home_of_its_name(tmp_path: Path) -> None:
     plan = tmp_path / "salon.json"
     square = [[0, 0], [5, 0], [5, 4], [0, 4]]
     plan.write_text(json.dumps({"rooms": [{"type": "living", "polygon": square}]}))
@@ -66,7 +66,7 @@ def test_a_plan_of_ones_own_becomes_a_home_of_its_name(tmp_path: Path) -> None:
         (["--plan", "none.json", "--rooms", "2"], "fixes the rooms: omit --rooms"),
     ],
 )
-def test_what_cannot_be_made_is_one_line_with_what_works(
+def test_an_impossible_home_is_one_line_with_the_alternatives(
     words: list[str], said: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     line = refused(capsys, *words, "--empty", "--out", tmp_path / "homes")
@@ -75,7 +75,7 @@ def test_what_cannot_be_made_is_one_line_with_what_works(
     assert not (tmp_path / "homes").exists()
 
 
-def test_ten_rooms_in_twenty_square_metres_are_refused_with_what_they_take(
+def test_ten_rooms_in_twenty_square_metres_are_refused_with_their_least_area(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     flat = tmp_path / "flat.json"
@@ -86,7 +86,7 @@ def test_ten_rooms_in_twenty_square_metres_are_refused_with_what_they_take(
     assert "rooms of these types take 101 to" in line
 
 
-def test_without_the_furniture_package_one_line_says_how_to_get_it(
+def test_without_the_furniture_package_one_line_explains_how_to_get_it(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setenv("PBRS_CACHE", str(tmp_path / "cache"))

@@ -1,4 +1,4 @@
-"""The remedy fits how the program was installed and the system it runs on."""
+"""The remedy fits the installation and the system."""
 
 from __future__ import annotations
 
@@ -29,27 +29,27 @@ def test_every_extra_named_is_one_of_pyproject() -> None:
         "optional-dependencies"
     ]
     assert set(EXTRA_OF.values()) <= {*extras, ""}
-    # `all` is every extra that a user may want; those of developers, benches and studies are apart.
+    # `all` is every extra for users, without those for developers, benches and studies.
     of_all = extras["all"][0].partition("[")[2].strip("]").split(",")
     assert set(of_all) == set(extras) - {
         "all", "bench", "dev", "docs", "imagenet", "notebooks", "release", "study", "study-peers", "tensorboard", "wandb",
     }  # fmt: skip
 
 
-def test_what_every_extra_of_all_gives_is_said() -> None:
+def test_the_contribution_of_every_extra_of_all_is_listed() -> None:
     extras = tomllib.loads((REPO / "pyproject.toml").read_text())["project"][
         "optional-dependencies"
     ]
     assert set(installation.GIVES) == set(extras["all"][0].partition("[")[2].strip("]").split(","))
 
 
-def test_what_is_missing_is_named_with_what_it_would_give(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_missing_extras_are_named_with_their_features(monkeypatch: pytest.MonkeyPatch) -> None:
     monkeypatch.setattr(doctor, "missing_extras", lambda: ["board", "usd"])
     monkeypatch.setattr(doctor, "install_command", lambda *names: f"pip install {','.join(names)}")
-    found = doctor._extras()
-    assert (found.state, found.remedy) == ("degraded", "pip install board,usd")
-    assert "board: a run in a browser; usd: homes from and to USD" in found.text
-    assert doctor.can_run([found])
+    finding = doctor.optional_extras()
+    assert (finding.state, finding.remedy) == ("degraded", "pip install board,usd")
+    assert "board: a run in a browser; usd: homes from and to USD" in finding.text
+    assert doctor.can_run([finding])
     monkeypatch.setattr(installation, "is_installed", lambda name: name != "uvicorn")
     assert installation.missing_extras() == ["board"]
 
@@ -63,7 +63,7 @@ def test_where_only_the_large_extra_is_missing_doctor_names_it_and_all_is_well(
     monkeypatch.setattr(doctor, "missing_extras", list)
     monkeypatch.setattr(doctor, "is_installed", lambda name: has_torch or name != "torch")
     monkeypatch.setattr(doctor, "install_command", lambda *_: "pip it")
-    assert doctor._extras() == doctor.Finding("extras", "ok", text)
+    assert doctor.optional_extras() == doctor.Finding("extras", "ok", text)
 
 
 @pytest.mark.parametrize(
@@ -74,7 +74,7 @@ def test_where_only_the_large_extra_is_missing_doctor_names_it_and_all_is_well(
         ("darwin", "arm64", "brew install llvm"),
     ],
 )
-def test_llvm_comes_by_pip_where_it_has_a_wheel(
+def test_llvm_comes_by_pip_if_it_has_a_wheel(
     system: str, machine: str, command: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("sys.platform", system)
@@ -87,7 +87,7 @@ def test_llvm_comes_by_pip_where_it_has_a_wheel(
     assert installation.llvm_command() == command
 
 
-def test_a_checkout_and_a_wheel_are_told_apart(
+def test_a_checkout_and_a_wheel_are_distinguished(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert checkout_folder() == REPO
@@ -99,7 +99,7 @@ def test_a_checkout_and_a_wheel_are_told_apart(
     assert install_command() == "pip install --force-reinstall 'pbrs-farm'"
 
 
-def test_the_word_pip_is_said_only_where_it_is_this_pythons(
+def test_pip_is_suggested_only_if_it_is_this_pythons(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     beside = str(Path(sys.executable).parent)
@@ -112,7 +112,7 @@ def test_the_word_pip_is_said_only_where_it_is_this_pythons(
     assert pip_command() == "pip"
 
 
-def test_every_hint_to_install_something_is_made_in_one_place() -> None:
+def test_every_hint_to_install_comes_from_one_module() -> None:
     for folder in ("pbrs_farm", "workers"):
         for path in (REPO / folder).rglob("*.py"):
             text = path.read_text(encoding="utf-8")
@@ -130,7 +130,7 @@ def test_every_hint_to_install_something_is_made_in_one_place() -> None:
         ("ID=plan9", "", "install LLVM 17 or later (its shared library)"),
     ],
 )
-def test_each_system_has_its_own_command(
+def test_each_system_has_its_install_command(
     release: str, system: str, command: str, tmp_path: Path
 ) -> None:
     file = tmp_path / "os-release"
@@ -139,9 +139,7 @@ def test_each_system_has_its_own_command(
     assert system_command("llvm", system or "none") == command
 
 
-def test_what_is_needed_and_missing_is_named_with_its_extra(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_missing_dependency_is_named_with_its_extra(monkeypatch: pytest.MonkeyPatch) -> None:
     need("numpy")
     monkeypatch.setattr(installation, "is_installed", lambda name: name == "drjit")
     with pytest.raises(MachineFailed, match=r"this needs mitsuba, av \(.*pip install.*\[video\]"):
@@ -150,10 +148,10 @@ def test_what_is_needed_and_missing_is_named_with_its_extra(
 
 @pytest.mark.quick(1)
 @pytest.mark.parametrize("words", ["run builtin --out x", "cameras builtin", "verify x", "layers"])
-def test_a_broken_installation_says_in_one_line_what_a_verb_needs(
+def test_a_broken_installation_is_reported_in_one_line_by_the_verb(
     words: str, tmp_path: Path
 ) -> None:
-    # Hide the packages from the import system of a process of its own.
+    # Hide the packages from the imports of a separate process.
     code = (
         "import sys\n"
         "hidden = {'mitsuba', 'drjit', 'pyoidn', 'moderngl'}\n"

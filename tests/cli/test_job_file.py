@@ -1,4 +1,4 @@
-"""A job as one file stands for the words of submit and pack."""
+"""A job file is equivalent to the arguments of submit and pack."""
 
 from __future__ import annotations
 
@@ -63,12 +63,10 @@ def test_tables_are_options_and_lists_are_many_words(tmp_path: Path) -> None:
     assert option_words(job["pack"], "job.toml") == ["--out", "shards"]
 
 
-def test_a_template_s_options_hold_for_the_homes_named_beside_it_but_for_those_given(
-    tmp_path: Path,
-) -> None:
+def test_a_templates_options_apply_to_added_homes_unless_overridden(tmp_path: Path) -> None:
     job, p = job_like(written(tmp_path, JOB), ["x.sh3d"]), parser()
-    given = p.parse_args(["x.sh3d", "--views", "9"])
-    args = submit_arguments(job, given, p, "job.toml")
+    arguments = p.parse_args(["x.sh3d", "--views", "9"])
+    args = submit_arguments(job, arguments, p, "job.toml")
     assert (args.homes, args.recipe, args.views, args.gpu) == (["x.sh3d"], "fast", 9, True)
     assert job_like(written(tmp_path, "[pack]\n"), ["x"]) == {"homes": ["x"], "pack": {}}
     with pytest.raises(BadInput, match="rendr: is not a table of a job"):
@@ -95,7 +93,9 @@ def test_homes_and_programmes_are_no_jobs(tmp_path: Path) -> None:
         ("homes = " + "[" * 3000, "is not valid TOML"),
     ],
 )
-def test_a_file_that_is_no_job_is_one_line(tmp_path: Path, text: str, message: str) -> None:
+def test_a_file_that_is_no_job_is_refused_in_one_line(
+    tmp_path: Path, text: str, message: str
+) -> None:
     with pytest.raises(BadInput, match=message):
         job_file([written(tmp_path, text)])
 
@@ -128,7 +128,7 @@ def test_an_entry_that_does_not_fit_is_named_with_its_file(entry: str, message: 
         submit_arguments(job, p.parse_args(["x"]), p, "render.toml")
 
 
-def test_libraries_and_pictures_of_one_s_own_are_one_list() -> None:
+def test_the_users_libraries_and_pictures_are_one_list() -> None:
     job = {"homes": ["a"], "render": {"catalogue": "a.sh3f", "pictures": ["b", "c"]}}
     assert arguments(job).catalogue == ["a.sh3f", "b", "c"]
     words = ["x", "--pictures", "b", "--catalogue", "a.sh3f"]

@@ -1,4 +1,4 @@
-"""A command imports the module of its own verb only, and the farm's verbs look without heavy packages."""
+"""A command imports only its verb's module, and the farm's read-only verbs no heavy packages."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def test_the_help_names_every_verb() -> None:
     assert sorted(verbs_of(build_parser())) == sorted(VERBS)
     text = build_parser().format_help()
     assert all(f"\n  {verb}" in text for verb in VERBS)
-    # The first screen knows the verbs without their modules.
+    # The first screen lists the verbs without importing their modules.
     assert first_screen().format_help() == text
 
 
@@ -48,13 +48,15 @@ except SystemExit:
 heavy = set({HEAVY.split()!r}) | {{"urllib.request", "importlib.metadata"}}
 print("last:", sorted(heavy & set(sys.modules)), "pathlib" in after_import)
 """
-    # Without what the interpreter loads for this environment (-S: no site).
+    # Without modules that the interpreter loads for this environment (-S: no site).
     words = [sys.executable, "-S", "-c", f"import sys; sys.path[:0] = {sys.path!r}" + code]
     done = subprocess.run(words, capture_output=True, text=True, check=True)
     assert done.stdout.splitlines()[-1] == "last: [] False"
 
 
-def test_the_help_says_what_the_farms_verbs_need(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_the_help_names_the_requirements_of_the_farms_verbs(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr("pbrs_farm.cli.has_farm", lambda: False)
     text = " ".join(build_parser().format_help().split())
     assert "the other commands of a farm need celery and redis: " in text
@@ -78,14 +80,14 @@ print(code, sorted(set({HEAVY.split()!r}) & set(sys.modules)))
 
 
 def test_recipes_and_jobs_import_no_scipy() -> None:
-    # Each process of a farm would wait for it and hold it, the coordinator among them.
+    # Each process of a farm would load it and keep it in memory, including the coordinator.
     code = "import sys, pbrs_farm.core.recipe, workers.job; print('scipy' in sys.modules)"
     done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
     assert done.stdout.strip() == "False"
 
 
 def parsers(parser: argparse.ArgumentParser, name: str) -> Iterator[tuple[str, Any]]:
-    """A parser and all below it, by the words that lead to them."""
+    """A parser and all its subparsers, by the words that lead to them."""
     yield name, parser
     for action in parser._actions:
         if isinstance(action, argparse._SubParsersAction):
@@ -119,7 +121,7 @@ def test_the_help_of_a_verb_ends_with_examples_that_parse(verb: str) -> None:
 @pytest.mark.parametrize(
     "name", [n for n, p in EVERY.items() if any(a.required and a.nargs != "*" for a in p._actions)]
 )
-def test_a_verb_without_its_words_says_what_it_wants(
+def test_a_verb_without_its_arguments_names_them(
     name: str, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(SystemExit) as ended:

@@ -1,4 +1,4 @@
-"""The time left of a run, from its events alone."""
+"""The remaining time of a run, computed only from its events."""
 
 from __future__ import annotations
 
@@ -15,49 +15,49 @@ def planned(house: str, n: int) -> Event:
 
 
 def view(left: TimeLeft, house: str, k: int, began_s: float, ended_s: float, how: str) -> None:
-    """A view from its first step to its end."""
+    """Report a view from its first step to its end."""
     left.hear(Event("begin", house, str(k), "truth"), began_s)
     left.hear(Event(how, house, str(k), "truth"), ended_s)  # type: ignore[arg-type]
     left.hear(Event("end", house, str(k), ""), ended_s)
 
 
-def test_nothing_is_told_before_a_view_was_made() -> None:
-    left = TimeLeft(1)
-    left.hear(planned("a", 4), 0)
-    assert left.seconds(9.0) is None
+def test_no_time_is_estimated_before_the_first_view() -> None:
+    timer = TimeLeft(1)
+    timer.hear(planned("a", 4), 0)
+    assert timer.seconds(9.0) is None
 
 
-def test_views_of_one_home_take_as_long_as_those_before() -> None:
-    left = TimeLeft(1)
-    left.hear(planned("a", 4), 0)
-    view(left, "a", 0, 10.0, 20.0, "done")
-    assert left.views_text == "1 of 4"
-    assert left.seconds(20.0) == pytest.approx(30.0)
-    view(left, "a", 1, 20.0, 40.0, "done")
-    assert left.seconds(40.0) == pytest.approx(30.0)
+def test_views_of_one_home_are_estimated_by_earlier_ones() -> None:
+    timer = TimeLeft(1)
+    timer.hear(planned("a", 4), 0)
+    view(timer, "a", 0, 10.0, 20.0, "done")
+    assert timer.views_text == "1 of 4"
+    assert timer.seconds(20.0) == pytest.approx(30.0)
+    view(timer, "a", 1, 20.0, 40.0, "done")
+    assert timer.seconds(40.0) == pytest.approx(30.0)
 
 
 def test_homes_not_read_yet_count_with_the_mean_of_the_others() -> None:
-    left = TimeLeft(3)
-    left.hear(planned("a", 4), 0)
-    view(left, "a", 0, 0.0, 10.0, "done")
-    assert left.views_text == "1 of about 12"
-    assert left.seconds(10.0) == pytest.approx(110.0)
+    timer = TimeLeft(3)
+    timer.hear(planned("a", 4), 0)
+    view(timer, "a", 0, 0.0, 10.0, "done")
+    assert timer.views_text == "1 of about 12"
+    assert timer.seconds(10.0) == pytest.approx(110.0)
 
 
-def test_homes_still_to_be_made_count_with_what_the_others_took() -> None:
-    left = TimeLeft(3)
-    left.hear(Event("begin", "a", None, "house"), 0.0)
-    left.hear(Event("done", "a", None, "house", seconds=60.0), 60.0)
-    left.hear(planned("a", 2), 60.0)
+def test_homes_still_to_be_made_are_estimated_by_the_others() -> None:
+    timer = TimeLeft(3)
+    timer.hear(Event("begin", "a", None, "house"), 0.0)
+    timer.hear(Event("done", "a", None, "house", seconds=60.0), 60.0)
+    timer.hear(planned("a", 2), 60.0)
     for k in range(2):
-        left.hear(Event("begin", "a", str(k), "truth"), 60.0 + 5 * k)
-        left.hear(Event("done", "a", str(k), "truth", seconds=5.0), 65.0 + 5 * k)
-        left.hear(Event("end", "a", str(k), ""), 65.0 + 5 * k)
-    assert left.seconds(70.0) == pytest.approx(140.0)
+        timer.hear(Event("begin", "a", str(k), "truth"), 60.0 + 5 * k)
+        timer.hear(Event("done", "a", str(k), "truth", seconds=5.0), 65.0 + 5 * k)
+        timer.hear(Event("end", "a", str(k), ""), 65.0 + 5 * k)
+    assert timer.seconds(70.0) == pytest.approx(140.0)
 
 
-def test_a_home_under_way_tells_its_share(
+def test_a_home_in_progress_reports_its_share(
     capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     now = [0.0]
@@ -70,30 +70,30 @@ def test_a_home_under_way_tells_its_share(
 
 
 def test_a_home_that_cannot_be_read_has_no_views() -> None:
-    left = TimeLeft(2)
-    left.hear(Event("failed", "b", None, "house"), 0.0)
-    left.hear(planned("a", 2), 0)
-    assert left.views_text == "0 of 2"
+    timer = TimeLeft(2)
+    timer.hear(Event("failed", "b", None, "house"), 0.0)
+    timer.hear(planned("a", 2), 0)
+    assert timer.views_text == "0 of 2"
 
 
 def test_views_that_are_there_already_do_not_make_the_rest_look_quick() -> None:
-    left = TimeLeft(1)
-    left.hear(planned("a", 4), 0)
-    left.hear(Event("kept", "a", "0", "truth"), 0.1)
-    left.hear(Event("end", "a", "0", ""), 0.1)
-    view(left, "a", 1, 0.1, 10.1, "done")
-    assert left.seconds(10.1) == pytest.approx(20.0)
+    timer = TimeLeft(1)
+    timer.hear(planned("a", 4), 0)
+    timer.hear(Event("kept", "a", "0", "truth"), 0.1)
+    timer.hear(Event("end", "a", "0", ""), 0.1)
+    view(timer, "a", 1, 0.1, 10.1, "done")
+    assert timer.seconds(10.1) == pytest.approx(20.0)
 
 
-def test_a_part_of_a_long_view_tells_already() -> None:
-    left = TimeLeft(1)
-    left.hear(planned("a", 2), 0)
-    left.hear(Event("begin", "a", "0", "light"), 0.0)
-    left.hear(Event("under_way", "a", "0", "light", facts={"share": 0.25}), 100.0)
-    assert left.seconds(100.0) == pytest.approx(700.0)
-    left.hear(Event("done", "a", "0", "light"), 400.0)
-    left.hear(Event("end", "a", "0", ""), 400.0)
-    assert left.seconds(400.0) == pytest.approx(400.0)
+def test_a_part_of_a_long_view_counts_already() -> None:
+    timer = TimeLeft(1)
+    timer.hear(planned("a", 2), 0)
+    timer.hear(Event("begin", "a", "0", "light"), 0.0)
+    timer.hear(Event("under_way", "a", "0", "light", facts={"share": 0.25}), 100.0)
+    assert timer.seconds(100.0) == pytest.approx(700.0)
+    timer.hear(Event("done", "a", "0", "light"), 400.0)
+    timer.hear(Event("end", "a", "0", ""), 400.0)
+    assert timer.seconds(400.0) == pytest.approx(400.0)
 
 
 def test_plain_lines_tell_the_share_of_a_long_view_twice_a_minute(
@@ -126,12 +126,12 @@ def test_plain_lines_tell_it(capsys: pytest.CaptureFixture[str]) -> None:
     ("seconds", "text"),
     [(40.4, "40 s"), (95, "2 min"), (5300, "88 min"), (12000, "3 h 20 min"), (190000, "2 d 4 h")],
 )
-def test_seconds_are_told_in_words(seconds: float, text: str) -> None:
+def test_seconds_are_formatted_in_words(seconds: float, text: str) -> None:
     assert seconds_text(seconds) == text
 
 
 class Terminal(io.StringIO):
-    """A standard error that is a terminal."""
+    """A standard error that claims to be a terminal."""
 
     def isatty(self) -> bool:
         return True
@@ -161,7 +161,7 @@ def test_a_terminal_gets_bars_with_count_rate_and_time_left_and_no_lines(
     assert capsys.readouterr().out == ""
 
 
-def test_what_is_counted_has_a_bar_on_a_terminal_and_nothing_elsewhere(
+def test_counted_work_has_a_bar_only_on_a_terminal(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with counting_bar("views") as tell:
@@ -177,9 +177,7 @@ def test_what_is_counted_has_a_bar_on_a_terminal_and_nothing_elsewhere(
     assert "2/2" in terminal.getvalue()
 
 
-def test_things_whose_number_is_unknown_are_counted_all_the_same(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_items_of_unknown_number_are_counted_too(monkeypatch: pytest.MonkeyPatch) -> None:
     terminal = Terminal()
     monkeypatch.setattr("sys.stderr", terminal)
     monkeypatch.setenv("COLUMNS", "160")
@@ -190,7 +188,7 @@ def test_things_whose_number_is_unknown_are_counted_all_the_same(
     assert "7/?" in terminal.getvalue()
 
 
-def test_long_work_shows_what_is_done_and_its_share_and_lines_go_where_they_went(
+def test_long_work_shows_count_and_share_and_lines_keep_their_stream(
     monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with share_bar("dress") as tell:

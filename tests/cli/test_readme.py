@@ -1,4 +1,4 @@
-"""README and the reference show what is true: the layers' table, and verbs that exist."""
+"""README and reference agree with the code: the table of layers, and existing verbs."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ README = (REPO / "README.md").read_text(encoding="utf-8")
 COMMANDS = (REPO / "docs/commands.md").read_text(encoding="utf-8")
 
 
-def test_the_layers_table_is_the_one_of_layers_py() -> None:
+def test_the_layers_table_equals_layers_py() -> None:
     assert layer_table() in (REPO / "docs/formats/layers.md").read_text(encoding="utf-8")
 
 
 def test_every_verb_shown_exists() -> None:
-    known = build_parser().format_help()
+    help_text = build_parser().format_help()
     for verb in set(re.findall(r"pbrs-farm ([a-z]+)", README + COMMANDS)):
-        assert re.search(rf"^\s+{verb}\b", known, re.MULTILINE), verb
+        assert re.search(rf"^\s+{verb}\b", help_text, re.MULTILINE), verb
 
 
 def test_every_linked_file_exists() -> None:

@@ -1,4 +1,4 @@
-"""`pbrs-farm scatter`: models of one's own in a home, looked at; a second call makes nothing anew."""
+"""`pbrs-farm scatter`: the user's models in a home, rendered; a second call renders nothing."""
 
 from __future__ import annotations
 
@@ -34,12 +34,12 @@ def test_scattered_models_are_seen_and_kept(
     frames = pf.open(tmp_path / "out")
     assert len(frames) == 2
     for frame in frames:
-        seen = [row for row in frame.instances if row.get("model") == "can"]
-        assert max(row["visible_fraction"] for row in seen) >= 0.5
+        rows = [row for row in frame.instances if row.get("model") == "can"]
+        assert max(row["visible_fraction"] for row in rows) >= 0.5
     assert verify(tmp_path / "out").is_clean
 
 
-def test_models_hang_in_the_air_and_are_labelled_so(
+def test_floating_models_are_labelled_as_such(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "models").mkdir()
@@ -59,7 +59,7 @@ def test_models_hang_in_the_air_and_are_labelled_so(
     assert "floating objects do not fall" in capsys.readouterr().err
 
 
-def test_what_a_model_lacks_is_a_line_and_a_note_of_the_home(
+def test_a_models_missing_parts_are_a_line_and_a_note_of_the_home(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     (tmp_path / "mug.mtl").write_text("newmtl a\nmap_Kd none.png\n")
@@ -90,7 +90,7 @@ def test_what_a_model_lacks_is_a_line_and_a_note_of_the_home(
         (["--models", "nothing/*.ply"], "no model found"),
     ],
 )
-def test_what_cannot_be_scattered_is_told(
+def test_models_that_cannot_be_scattered_are_reported(
     options: list[str], says: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     can(tmp_path)
@@ -101,14 +101,14 @@ def test_what_cannot_be_scattered_is_told(
     assert says in capsys.readouterr().err
 
 
-def test_cameras_stand_in_rooms_at_the_distance_asked_for(tmp_path: Path) -> None:
+def test_cameras_are_in_rooms_at_the_requested_distance(tmp_path: Path) -> None:
     home = small_home().scatter([crate(tmp_path)], 3, on="desk")
-    found = home.cameras_around(n=4, distance_m=(0.6, 0.9), size=(64, 48), seed=1)
+    cameras = home.cameras_around(n=4, distance_m=(0.6, 0.9), size=(64, 48), seed=1)
     middles = np.array([i.bounds.mean(0) for i in home.house.items if i.pose])
-    for one in found:
-        # Of one of the three; the others may be nearer.
-        away = np.linalg.norm(middles - one.camera.eye, axis=1)
+    for camera in cameras:
+        # The distance to one of the three; the others may be nearer.
+        away = np.linalg.norm(middles - camera.camera.eye, axis=1)
         assert ((away >= 0.6 - 1e-6) & (away <= 0.9 + 1e-6)).any()
-        assert one.room == "0_1"
+        assert camera.room == "0_1"
     again = home.cameras_around(n=4, distance_m=(0.6, 0.9), size=(64, 48), seed=1)
-    assert [one.id for one in found] == [one.id for one in again]
+    assert [camera.id for camera in cameras] == [camera.id for camera in again]

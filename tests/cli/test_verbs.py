@@ -1,4 +1,4 @@
-"""The verbs doctor, homes, skies, repair, cameras, reference and select, run as a user runs them."""
+"""The verbs doctor, homes, skies, repair, cameras, reference and select on the command line."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pbrs_farm import doctor, images
 from pbrs_farm.assets import homes_package
 from pbrs_farm.cli import main
 from pbrs_farm.commands import explaining, making
-from pbrs_farm.commands.making import _folder_of
+from pbrs_farm.commands.making import default_output
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.core.layers import LAYERS, text_table
@@ -38,22 +38,22 @@ def printed(capsys: pytest.CaptureFixture[str], *words: str, code: int = 0) -> s
     return captured.err if code else captured.out
 
 
-def test_doctor_finds_what_every_other_test_uses(tmp_path, capsys):
+def test_doctor_finds_everything_that_other_tests_use(tmp_path, capsys):
     words = ["doctor", "--json", "--store", str(tmp_path), "--redis", "redis://127.0.0.1:1/0"]
     assert main(words) == 0
-    found = json.loads(capsys.readouterr().out)
-    parts = {row["part"]: row for row in found["findings"]}
-    assert found["can_run"]
+    report = json.loads(capsys.readouterr().out)
+    parts = {row["part"]: row for row in report["findings"]}
+    assert report["can_run"]
     for part in ("python", "packages", "GL", "denoiser", "pictures", "mitsuba scalar_rgb", "store"):
         assert parts[part]["state"] == "ok", parts[part]
     assert parts["redis"]["state"] == "degraded"
     assert "Connection refused" in parts["redis"]["text"]
     assert not any(tmp_path.rglob("probe.txt"))
-    # A check whose own names are stale says so as an import error: none may.
+    # A check that uses stale names reports an import error: none may.
     assert not [row for row in parts.values() if "cannot import" in row["text"]]
 
 
-def test_doctor_says_what_to_do_about_what_is_missing(monkeypatch, capsys):
+def test_doctor_gives_a_remedy_for_missing_parts(monkeypatch, capsys):
     findings = [
         doctor.Finding("denoiser", "missing", "no library", "install it", needed=True),
         doctor.Finding("LLVM", "degraded", "too old", "take 19"),
@@ -69,7 +69,7 @@ def test_doctor_says_what_to_do_about_what_is_missing(monkeypatch, capsys):
     assert "cannot render yet" in text
 
 
-def test_a_machine_without_opengl_alone_can_render_by_path_tracing(monkeypatch, capsys):
+def test_a_machine_without_opengl_can_render_by_path_tracing(monkeypatch, capsys):
     findings = [
         doctor.Finding("python", "ok", "3.11", needed=True),
         doctor.Finding(doctor.GL, "degraded", "no EGL", "install it"),
@@ -91,10 +91,10 @@ def test_a_check_that_crashes_or_exits_is_a_finding():
     assert not doctor.can_run([unknown])
 
 
-def test_a_machine_without_variants_llvm_or_redis_is_told(monkeypatch):
+def test_missing_variants_llvm_or_redis_are_reported(monkeypatch):
     broken = doctor.Finding("x", "degraded", "does not work")
     monkeypatch.setattr(doctor, "probe", lambda *_args, **_kwargs: broken)
-    assert [f.needed for f in doctor._variants()] == [False, False, True]
+    assert [f.needed for f in doctor.renderer_variants()] == [False, False, True]
     monkeypatch.setattr("pbrs_farm.raycast.variant.find_llvm", lambda: None)
     old = [((15, 0, 6), Path("libLLVM-15.so"))]
     monkeypatch.setattr("pbrs_farm.raycast.variant.llvm_libraries", lambda: old)
@@ -120,7 +120,7 @@ def test_homes_lists_the_nine_homes_and_how_to_fetch_them(tmp_path, monkeypatch,
     assert "made:1..20" in text
 
 
-def test_homes_fetch_without_apt_says_where_to_put_the_package(tmp_path, monkeypatch, capsys):
+def test_homes_fetch_without_apt_names_the_folder_for_the_package(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("PBRS_CACHE", str(tmp_path))
     monkeypatch.setenv("PATH", "")
     monkeypatch.setenv("PBRS_DEBIAN_MIRROR", "http://127.0.0.1:1")
@@ -138,12 +138,12 @@ def test_homes_fetch_unpacks_the_package_and_notes_another_version(tmp_path, mon
 
 
 @pytest.mark.homes
-def test_homes_tells_which_package_was_fetched(capsys):
+def test_homes_names_the_fetched_package(capsys):
     assert example_homes().label in printed(capsys, "homes")
 
 
 def write_deb(path: Path, files: dict[str, bytes]) -> None:
-    """A Debian package of files: an ar archive whose data.tar is not compressed."""
+    """Write a Debian package of files: an ar archive with an uncompressed data.tar."""
     tar = io.BytesIO()
     with tarfile.open(fileobj=tar, mode="w") as archive:
         for name, data in files.items():
@@ -155,22 +155,20 @@ def write_deb(path: Path, files: dict[str, bytes]) -> None:
     path.write_bytes(b"!<arch>\n" + head.encode() + data)
 
 
-def test_skies_unpacks_the_outdoor_panoramas_and_says_how_to_use_them(
-    tmp_path, monkeypatch, capsys
-):
+def test_skies_unpacks_the_outdoor_panoramas_and_explains_their_use(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("PBRS_CACHE", str(tmp_path))
     names = ("city", "forest", "sunrise", "sunset", "studio")
     files = {f"usr/share/studiolights/world/{name}.exr": name.encode() for name in names}
     write_deb(tmp_path / "blender-data_3.4.1+dfsg-2_all.deb", files)
     text = printed(capsys, "skies")
     assert f"--set sky.panoramas={tmp_path / 'skies'}" in text
-    kept = sorted((tmp_path / "skies").iterdir())
-    assert [p.stem for p in kept] == ["city", "forest", "sunrise", "sunset"]
-    assert kept[1].read_bytes() == b"forest"
-    assert printed(capsys, "skies") == text  # from the folder, this time
+    folders = sorted((tmp_path / "skies").iterdir())
+    assert [p.stem for p in folders] == ["city", "forest", "sunrise", "sunset"]
+    assert folders[1].read_bytes() == b"forest"
+    assert printed(capsys, "skies") == text  # from the folder this time
 
 
-def test_skies_names_a_package_that_holds_none(tmp_path, monkeypatch, capsys):
+def test_skies_names_a_package_without_panoramas(tmp_path, monkeypatch, capsys):
     monkeypatch.setenv("PBRS_CACHE", str(tmp_path))
     write_deb(tmp_path / "blender-data_3_all.deb", {"usr/share/doc/readme": b""})
     assert "has no city.exr" in printed(capsys, "skies", code=1)
@@ -194,7 +192,7 @@ def test_repair_names_a_home_that_does_not_exist(tmp_path, capsys):
 
 @pytest.fixture(scope="module")
 def chosen(tmp_path_factory):
-    """The cameras of the built-in home: (folder of cameras.json and the map, JSON)."""
+    """The chosen cameras of the built-in home: (folder of cameras.json and the map, JSON)."""
     folder = tmp_path_factory.mktemp("cameras")
     words = ["cameras", "builtin", "--out", str(folder / "cameras.json")]
     assert main([*words, "--map", str(folder / "plan.png"), *PREVIEW]) == 0
@@ -225,7 +223,7 @@ def test_cameras_prints_the_same_views_as_json(chosen, capsys):
     assert json.loads(printed(capsys, "cameras", "builtin", "--json", *PREVIEW)) == chosen[1]
 
 
-def test_cameras_says_of_each_sector_why_candidates_were_rejected(chosen, capsys):
+def test_cameras_gives_the_reasons_of_rejection_for_each_sector(chosen, capsys):
     text = printed(capsys, "cameras", "builtin", *PREVIEW)
     report = chosen[1]["report"]
     assert text.count("  sector ") == sum(len(room["sectors"]) for room in report["rooms"])
@@ -287,14 +285,14 @@ def test_select_by_a_reference_that_was_built_writes_the_run_and_its_report(
     assert "<h1>Selection “low”</h1>" in (root / "selection/low.html").read_text()
 
 
-def test_the_report_shows_the_nearest_photographs_where_they_are(
+def test_the_report_shows_the_nearest_photographs_if_they_exist(
     root, photographs, tmp_path, capsys
 ):
     words = ("select", str(root), "--reference", str(photographs), *LOW, "--report")
     printed(capsys, *words, "--run", "here")
     html = (root / "selection/here.html").read_text()
     assert 'alt="photograph p' in html
-    # From a file of histograms alone there is nothing to show, unless the folder is named.
+    # A file of histograms has no pictures to show, unless the folder is named.
     reference = tmp_path / "photographs.npz"
     bins = ("--set", "histogram.colour_bins=4", "--set", "histogram.depth_bins=16")
     printed(capsys, "reference", "build", str(photographs), "--out", str(reference), *bins)
@@ -322,8 +320,8 @@ def test_select_names_a_wrong_word_and_a_missing_file(root, tmp_path, capsys):
     assert "expected histogram.FIELD=value or selection.FIELD=value" in error
 
 
-def test_a_run_goes_to_a_folder_of_the_homes_name_where_none_is_told() -> None:
-    assert [_folder_of(h) for h in ("Studio", "some/My Home.sh3d", "made:1..5", "builtin")] == [
+def test_the_default_output_folder_has_the_homes_name() -> None:
+    assert [default_output(h) for h in ("Studio", "some/My Home.sh3d", "made:1..5", "builtin")] == [
         "out/studio", "out/my-home", "out/made", "out/builtin",
     ]  # fmt: skip
 
@@ -348,7 +346,7 @@ def test_the_layers_on_a_terminal_are_columns_that_fit_it() -> None:
     assert any(line.startswith("depth_z") for line in lines)
 
 
-def test_a_demo_that_made_nothing_does_not_show_an_older_one(tmp_path, monkeypatch, capsys):
+def test_a_demo_without_output_does_not_show_an_older_one(tmp_path, monkeypatch, capsys):
     (tmp_path / "sheet.png").write_bytes(b"older")
     monkeypatch.setattr(making, "run_homes", lambda *_, **__: 1)
     assert main(["demo", "--home", "builtin", "--bare", "--out", str(tmp_path)]) == 1
@@ -356,7 +354,7 @@ def test_a_demo_that_made_nothing_does_not_show_an_older_one(tmp_path, monkeypat
     assert (tmp_path / "sheet.png").read_bytes() == b"older"
 
 
-def test_a_demo_without_a_network_says_what_it_cannot_fetch_and_shows_the_built_in_home(
+def test_a_demo_without_a_network_names_the_missing_downloads_and_shows_the_built_in_home(
     tmp_path, monkeypatch, capsys
 ):
     def refuse(*_args: object) -> None:
@@ -364,12 +362,12 @@ def test_a_demo_without_a_network_says_what_it_cannot_fetch_and_shows_the_built_
 
     shown: list[list[str]] = []
     monkeypatch.setenv("PBRS_CACHE", str(tmp_path / "cache"))
-    monkeypatch.setattr("pbrs_farm.assets.debian._fetch", refuse)
+    monkeypatch.setattr("pbrs_farm.assets.debian.fetch_deb", refuse)
     monkeypatch.setattr(making, "run_homes", lambda _args, homes, **_: shown.append(homes) or 1)
     main(["demo", "--out", str(tmp_path / "out")])
     assert shown == [["builtin"]]
-    told = capsys.readouterr().err.splitlines()
-    assert told == [
+    lines = capsys.readouterr().err.splitlines()
+    assert lines == [
         "pbrs-farm: fetching the example homes, 17 MB, once",
         "pbrs-farm: the example homes cannot be fetched: https://mirror/some.deb: no route (put it into the cache)",
         "pbrs-farm: going on with the built-in home",
@@ -377,6 +375,6 @@ def test_a_demo_without_a_network_says_what_it_cannot_fetch_and_shows_the_built_
         "pbrs-farm: the furniture cannot be fetched: https://mirror/some.deb: no route (put it into the cache)",
         "pbrs-farm: going on with the home as it was drawn",
     ]
-    # With --bare nothing is fetched but the home.
+    # With --bare only the home is fetched.
     main(["demo", "--home", "builtin", "--bare", "--out", str(tmp_path / "out")])
     assert capsys.readouterr().err == ""

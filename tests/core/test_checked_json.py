@@ -1,4 +1,4 @@
-"""What JSON is refused with: the file, the place, our own words; and nothing of pydantic's."""
+"""Refusals of JSON: file, place and our wording, without pydantic's."""
 
 import re
 from typing import Annotated, Literal
@@ -46,7 +46,7 @@ class Whole(Record):
         ({"nam": ""}, "parts[0].nam", "no such field (did you mean name?"),
     ],
 )
-def test_a_value_that_does_not_fit_is_one_line_with_its_place(part, place, text):
+def test_an_invalid_value_is_one_line_with_its_place(part, place, text):
     with pytest.raises(BadHouse) as caught:
         checked(Whole, {"parts": [part]}, "a.json", "room 1", error=BadHouse, hint="again")
     assert caught.value.place == f"room 1, {place}"
@@ -67,13 +67,13 @@ def test_a_value_that_does_not_fit_is_one_line_with_its_place(part, place, text)
         (b"[1, []]", "a.json: list[1]: expected a number, got a list"),
     ],
 )
-def test_bytes_that_do_not_fit_are_one_line_with_their_place(data, text):
+def test_invalid_bytes_are_one_line_with_their_place(data, text):
     with pytest.raises(BadInput, match=re.escape(text)) as caught:
         checked(TypeAdapter(list[Finite]), data, "a.json", "list")
     assert not PYDANTICS_WORDS.search(str(caught.value).replace("a.json", ""))
 
 
-def test_what_fits_is_read_as_it_stands():
+def test_valid_json_is_read_unchanged():
     part = {"name": "a", "at": [1, 2.5, 3], "share": 0}
     assert checked(Part, part, "a.json") == Part(name="a", at=(1.0, 2.5, 3.0), share=0.0)
     assert checked(TypeAdapter(list[Finite]), b"[1, 2.5]", "a.json") == [1.0, 2.5]

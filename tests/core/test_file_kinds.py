@@ -1,4 +1,4 @@
-"""A file of another kind than its name says is named as what it is, wherever files are taken."""
+"""A file whose content contradicts its suffix is reported with its real kind by every reader."""
 
 from __future__ import annotations
 
@@ -82,11 +82,11 @@ TAKEN: list[tuple[str, Take]] = [
         pytest.param(name, take, words, id=f"{name} {words}")
         for name, take in TAKEN
         for words in CONTENTS
-        # USDZ is ZIP, and a picture is one whatever its suffix.
+        # USDZ is ZIP, and a picture is accepted under any suffix.
         if (name, words) not in {("home.usdz", "a ZIP archive"), ("photo.jpg", "a PNG picture")}
     ],
 )
-def test_a_file_of_another_kind_is_named_as_what_it_is(
+def test_a_file_of_another_kind_is_reported_with_its_kind(
     name: str, take: Take, words: str, tmp_path: Path
 ) -> None:
     with pytest.raises(pf.PbrsError, match=f"{name}: is {words}"):
@@ -98,13 +98,13 @@ def _written(path: Path, data: bytes) -> Path:
     return path
 
 
-def test_a_file_of_its_own_kind_that_is_damaged_has_its_readers_words(tmp_path: Path) -> None:
+def test_a_damaged_file_of_the_right_kind_keeps_its_readers_message(tmp_path: Path) -> None:
     scene = two_rooms().glb()
     with pytest.raises(pf.BadHouse, match=r"cut short|longer|ends"):
         read_house(
             resolve(str(_written(tmp_path / "a.glb", scene[: len(scene) // 2]))), ReadFields()
         )
-    # A scene is read by what it holds, whatever it is called.
+    # A scene is read by its content, under any name.
     assert read_house(resolve(str(_written(tmp_path / "a.gltf", scene))), ReadFields()).rooms
 
 

@@ -1,4 +1,4 @@
-"""Transforms: which of them can be undone."""
+"""Transforms: which are invertible."""
 
 from __future__ import annotations
 

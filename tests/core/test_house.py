@@ -1,4 +1,4 @@
-"""The nouns of a house as text."""
+"""The types of a house as text."""
 
 from __future__ import annotations
 
@@ -6,7 +6,7 @@ from pbrs_farm.core.house import Texture, geometry_from_house
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 
 
-def test_a_house_and_its_parts_say_in_a_line_what_they_are() -> None:
+def test_a_house_and_its_parts_describe_themselves_in_a_line() -> None:
     house = builtin_home()
     item = next(item for item in house.items if item.surfaces)
     texture = Texture("0f", "oak", "image/png", bytes(40_000))

@@ -1,4 +1,4 @@
-"""Joints turn and slide what they move, and go with what they are part of."""
+"""Joints turn and slide their parts, and follow the item they belong to."""
 
 from __future__ import annotations
 
@@ -22,18 +22,18 @@ def test_a_hinge_turns_anticlockwise_about_its_axis() -> None:
     assert half == pytest.approx(np.array([[1 + s, 0.5, 2 + s]]))
 
 
-def test_a_motion_begins_where_the_part_stands() -> None:
+def test_a_motion_begins_at_the_parts_pose() -> None:
     drawer = Joint("drawer 1", JointKind.PRISMATIC, (0, 0, 0), (0.0, 0.0, 1.0), 0.4, value=0.3)
     assert transform_points(drawer.motion(0.0), EDGE) == pytest.approx(EDGE - [0, 0, 0.3])
     assert drawer.share == pytest.approx(0.75)
 
 
 @pytest.mark.parametrize("mirror", [1.0, -1.0])
-def test_a_joint_goes_with_a_thing_that_is_placed_scaled_or_mirrored(mirror: float) -> None:
+def test_a_joint_follows_an_item_that_is_placed_scaled_or_mirrored(mirror: float) -> None:
     matrix = np.eye(4)
     matrix[:3, :3] = rotation_y(0.7) @ np.diag([2.0 * mirror, 1.5, 3.0])
     matrix[:3, 3] = [4.0, 0.5, -2.0]
-    # Opening and then placing is placing and then opening: hinge and edge lie along scaled axes.
+    # Opening then placing equals placing then opening: hinge and edge are along scaled axes.
     placed = DOOR.placed(matrix)
     shut = transform_points(matrix, EDGE)
     opened = transform_points(placed.motion(np.pi / 2), shut)

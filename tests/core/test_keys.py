@@ -1,4 +1,4 @@
-"""Keys: what is built is parsed back, and nothing else is."""
+"""Keys: built keys are parsed back, and nothing else is."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from pbrs_farm.core.keys import HouseKey
 
 
 @pytest.mark.parametrize("house", ["studio-0a1b2c3d", "object_chair-1"])
-def test_every_key_below_a_house_parses_to_what_it_was_built_from(house: str) -> None:
+def test_every_key_below_a_house_is_parsed_back(house: str) -> None:
     parse = keys.parse_house_key
     assert parse(keys.house_key(house, "house.glb")) == HouseKey(house, "house.glb")
     file = "behind_glass/depth.png"
@@ -36,5 +36,5 @@ def test_every_key_below_a_house_parses_to_what_it_was_built_from(house: str) ->
         "selection/histograms/h.bin",
     ],
 )
-def test_a_key_that_nobody_builds_below_a_house_is_none(key: str) -> None:
+def test_an_unknown_key_below_a_house_is_refused(key: str) -> None:
     assert keys.parse_house_key(key) is None

@@ -1,4 +1,4 @@
-"""The table of layers is the only list: one file adds a layer to it."""
+"""The table of layers is the only list: one file adds a layer."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_a_file_is_all_that_a_new_layer_takes(tmp_path: Path) -> None:
     (info / "entry_points.txt").write_text("[pbrs_farm.layers]\nslope = slope:SLOPE\n")
     env = {**os.environ, "PYTHONPATH": os.pathsep.join([str(tmp_path), str(REPO)])}
 
-    def said(*words: str) -> str:
+    def output_of(*words: str) -> str:
         command = [sys.executable, *words]
         done = subprocess.run(command, env=env, cwd=tmp_path, capture_output=True, text=True)
         assert done.returncode == 0, done.stdout + done.stderr
@@ -58,15 +58,17 @@ def test_a_file_is_all_that_a_new_layer_takes(tmp_path: Path) -> None:
 
     few = ["--recipe", "preview", "--modes", "opengl_dl", "--views", "1", "--out", "o"]
     few += [word for name, value in SMALL.items() for word in ("--set", f"{name}={value}")]
-    # It is written, listed, told of by verify, and shown by the board.
-    said("-m", "pbrs_farm.cli", "run", "builtin", "--layers", "slope", *few)
-    assert "degrees from level" in said("-m", "pbrs_farm.cli", "layers")
-    assert "slope.png (1): hash, size and type alone" in said("-m", "pbrs_farm.cli", "verify", "o")
-    assert said("-c", SHOW).split() == ["Slope", "244"]
+    # It is written, listed, checked by verify, and shown by the board.
+    output_of("-m", "pbrs_farm.cli", "run", "builtin", "--layers", "slope", *few)
+    assert "degrees from level" in output_of("-m", "pbrs_farm.cli", "layers")
+    assert "slope.png (1): hash, size and type alone" in output_of(
+        "-m", "pbrs_farm.cli", "verify", "o"
+    )
+    assert output_of("-c", SHOW).split() == ["Slope", "244"]
 
 
 def test_each_cell_of_the_table_is_a_value_of_its_field():
-    # layers.py reads the table without pydantic, so a wrong word in a cell would pass unnoticed.
+    # layers.py reads the table without pydantic, so a wrong value in a cell would pass unnoticed.
     rows = [TypeAdapter(Layer).validate_python(asdict(layer)) for layer in OWN_LAYERS]
     assert rows == list(OWN_LAYERS)
 

@@ -9,12 +9,12 @@ from pbrs_farm.core.made_home import MadeHome, made_homes
 from pbrs_farm.prepare.source import words_of_homes
 
 
-def test_a_range_names_one_home_a_seed() -> None:
+def test_a_range_names_one_home_per_seed() -> None:
     words = words_of_homes(["builtin", "made:3..5,rooms=2..3"])
     assert words == ["builtin", *(f"made:{k},rooms=2..3" for k in (3, 4, 5))]
 
 
-def test_a_word_says_all_of_its_home() -> None:
+def test_a_word_defines_its_home_completely() -> None:
     home = MadeHome(
         7, (2, 3), (90, 110), "nordic", furniture=False, storeys=2, plans="us", offices=1
     )

@@ -64,7 +64,7 @@ def test_bounds_of_points_hold_them_all_and_are_double() -> None:
     np.testing.assert_array_equal([low, high], [points.min(0), points.max(0)])
 
 
-def test_boxes_that_touch_meet_and_one_apart_along_an_axis_does_not() -> None:
+def test_touching_boxes_meet_and_separated_ones_do_not() -> None:
     low = np.array([[1.0, 0, 0], [0, 1.1, 0], [0, 0, -2], [0.2, 0.2, 0.2], [np.nan] * 3])
     meets = boxes_meeting(low, low + 1.0, np.zeros(3), np.ones(3))
     assert meets.tolist() == [True, False, False, True, False]
@@ -79,11 +79,13 @@ def test_unique_points_are_numpys_unique_rows(n: int) -> None:
 @pytest.mark.parametrize("n", [0, 1, 2, 200])
 def test_points_are_numbered_as_numpys_unique_rows_are(n: int) -> None:
     points = np.random.default_rng(4).integers(-1, 3, (n, 3)).astype(np.float64)
-    points *= np.where(np.arange(n) % 2, 1.0, -1.0)[:, None]  # zeros of both signs are one place
+    points *= np.where(np.arange(n) % 2, 1.0, -1.0)[
+        :, None
+    ]  # zeros of both signs are the same place
     _, first, number = np.unique(points, axis=0, return_index=True, return_inverse=True)
-    found = numbered_points(points)
-    np.testing.assert_array_equal(found[0], first)
-    np.testing.assert_array_equal(found[1], np.ravel(number))
+    numbers = numbered_points(points)
+    np.testing.assert_array_equal(numbers[0], first)
+    np.testing.assert_array_equal(numbers[1], np.ravel(number))
 
 
 @pytest.mark.parametrize("seed", range(20))
@@ -106,8 +108,8 @@ def cut_by_trimesh(corners: np.ndarray, low: np.ndarray, high: np.ndarray) -> np
 
 @pytest.mark.parametrize("is_on_a_grid", [False, True])
 @pytest.mark.parametrize("seed", range(30))
-def test_what_is_cut_by_a_box_is_trimeshs_to_the_bit(seed: int, is_on_a_grid: bool) -> None:
-    # On a grid many corners, edges and whole faces lie in the box's sides.
+def test_boxes_cut_triangles_exactly_like_trimesh(seed: int, is_on_a_grid: bool) -> None:
+    # On a grid many corners, edges and whole faces are in the box's sides.
     random = np.random.default_rng(seed)
     corners, size = random.normal(size=(60, 3, 3)), random.uniform(0.2, 2.0, 3)
     if is_on_a_grid:
@@ -116,7 +118,7 @@ def test_what_is_cut_by_a_box_is_trimeshs_to_the_bit(seed: int, is_on_a_grid: bo
     np.testing.assert_array_equal(cut, cut_by_trimesh(corners, -size, size))
 
 
-def test_a_triangle_over_a_corner_of_the_box_keeps_what_is_inside() -> None:
+def test_a_triangle_over_a_corner_of_the_box_keeps_the_inner_part() -> None:
     cut = clipped_to_box(TRIANGLE[None], np.array([-1.0, -1, -1]), np.array([1.0, 1, 1]))
     assert face_areas(cut).sum() == pytest.approx(1)
     outside = np.array([3.0, 3, 3])
@@ -154,15 +156,15 @@ def test_turned_and_collapsed_faces_do_not_open_a_mesh() -> None:
     [
         ((0.5, 0.5, 0.3), 0.3),  # above the inside
         ((0.5, 0.5, 0.0), 0.0),  # in it
-        ((-3.0, -4.0, 0.0), 5.0),  # nearest to a corner
-        ((1.0, -0.7, 0.0), 0.7),  # nearest to an edge
-        ((2.0, 2.0, 0.0), np.sqrt(2.0)),  # nearest to the slanted edge
-        ((3.0, 0.0, 1.0), np.sqrt(2.0)),  # nearest to a corner, off the plane
+        ((-3.0, -4.0, 0.0), 5.0),  # nearest: a corner
+        ((1.0, -0.7, 0.0), 0.7),  # nearest: an edge
+        ((2.0, 2.0, 0.0), np.sqrt(2.0)),  # nearest: the slanted edge
+        ((3.0, 0.0, 1.0), np.sqrt(2.0)),  # nearest: a corner, off the plane
     ],
 )
 def test_the_distance_is_that_of_geometry(point: tuple[float, ...], distance: float) -> None:
-    found = distances_to_triangles(np.array(point), TRIANGLE[None])
-    assert found[0] == pytest.approx(distance, abs=1e-12)
+    computed = distances_to_triangles(np.array(point), TRIANGLE[None])
+    assert computed[0] == pytest.approx(distance, abs=1e-12)
 
 
 def test_a_triangle_without_area_is_a_segment_or_a_point() -> None:
@@ -186,7 +188,7 @@ def test_areas_normals_and_distances_agree_with_trimesh(seed: int) -> None:
 
 
 def test_small_triangles_are_as_exact_as_large_ones() -> None:
-    # trimesh.triangles.closest_point is not: it takes these for their edges.
+    # trimesh.triangles.closest_point is wrong here: it returns points of the edges.
     rng = np.random.default_rng(0)
     corners, points = rng.uniform(-1, 1, (100, 3, 3)), rng.uniform(-1, 1, (100, 3))
     large = distances_to_triangles(points, corners)
@@ -194,26 +196,26 @@ def test_small_triangles_are_as_exact_as_large_ones() -> None:
     np.testing.assert_allclose(small, 1e-4 * large, rtol=1e-9)
 
 
-def test_edges_are_paired_where_each_is_met_by_its_reverse_as_often() -> None:
+def test_edges_are_paired_if_each_reverse_occurs_as_often() -> None:
     tetrahedron = np.array([[0, 2, 1], [0, 1, 3], [1, 2, 3], [2, 0, 3]])
     assert edges_are_paired(tetrahedron)
     assert edges_are_paired(tetrahedron[:0])
     assert not edges_are_paired(tetrahedron[1:])
     assert not edges_are_paired(np.concatenate([tetrahedron[:1, ::-1], tetrahedron[1:]]))
-    # A fan has a rim; closed by the same fan turned round it has none.
+    # A fan has a rim; together with the reversed fan it has none.
     fan = np.array([[0, k, k + 1] for k in range(1, 6)])
     assert not edges_are_paired(fan)
     assert edges_are_paired(np.concatenate([fan, fan[:, ::-1]]))
-    # A face that is a line has the edges of a line, there and back.
+    # A degenerate face has the edges of a line, in both directions.
     assert edges_are_paired(np.concatenate([tetrahedron, [[0, 1, 1]]]))
 
 
 @pytest.mark.parametrize("dtype", [np.float64, np.float32])
 def test_cross_products_are_numpys_to_the_bit(dtype: type) -> None:
     a, b = np.random.default_rng(0).normal(size=(2, 500, 3)).astype(dtype)
-    found = cross_products(a, b)
-    assert found.dtype == dtype
-    assert found.tobytes() == np.cross(a, b).tobytes()
+    products = cross_products(a, b)
+    assert products.dtype == dtype
+    assert products.tobytes() == np.cross(a, b).tobytes()
     assert np.array_equal(cross_products(a[0], b), np.cross(a[0], b))
 
 

@@ -1,4 +1,4 @@
-"""Motions between their keys, by closed forms."""
+"""Motions between their keys, in closed form."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from pbrs_farm.core.motions import Motion, fault_of_motion
 
 DRAWER = Motion("desk", "drawer 1", (1.0, 3.0), ((0.1,), (0.5,)))
 HALF_TURN = (0.0, 0.0, 1.0, 0.0)  # 180 degrees about y
-# A thing of which a point at (1, 0, 0) is the pivot: it goes up 2 m and turns by 180 degrees in 4 s.
+# An item with its pivot at (1, 0, 0) that rises 2 m and turns by 180 degrees in 4 s.
 FLIGHT = Motion("mug", "", (0.0, 4.0), ((1, 0, 0, 1, 0, 0, 0), (1, 2, 0, *HALF_TURN)), (1.0, 0, 0))
 
 
@@ -37,7 +37,7 @@ def test_a_body_moves_with_its_pivot_and_turns_about_it() -> None:
 
 def test_a_turn_takes_the_shorter_arc() -> None:
     c, s = np.cos(np.radians(5)), np.sin(np.radians(5))
-    # The same turn of 10 degrees, told by the other of its two quaternions.
+    # The same turn of 10 degrees with the opposite of its two quaternions.
     motion = Motion("mug", "", (0.0, 1.0), ((0, 0, 0, 1, 0, 0, 0), (0, 0, 0, -c, 0, -s, 0)))
     angle = np.degrees(np.arccos(motion.matrix_at(0.5)[0, 0]))
     assert angle == pytest.approx(5)
@@ -54,6 +54,6 @@ def test_a_turn_takes_the_shorter_arc() -> None:
         (Motion("a", "", (), ()), "0 times"),
     ],
 )
-def test_what_is_wrong_with_a_motion_is_told(motion: Motion, fault: str) -> None:
+def test_faults_of_a_motion_are_reported(motion: Motion, fault: str) -> None:
     assert fault in fault_of_motion(motion)
     assert fault_of_motion(DRAWER) == fault_of_motion(FLIGHT) == ""

@@ -1,4 +1,4 @@
-"""A slip is offered the name it is nearest to, and nothing where none is near."""
+"""A misspelling is answered with the nearest name, or with nothing if none is near."""
 
 from __future__ import annotations
 
@@ -11,12 +11,12 @@ from pbrs_farm.core.shown_text import did_you_mean, hint_of_choice, near_names
 HOMES = ("Studio", "2BedroomApartment", "4BedroomHouse", "builtin")
 
 
-def test_the_nearest_name_comes_first_whatever_its_case() -> None:
+def test_the_nearest_name_in_any_case_comes_first() -> None:
     assert near_names("studoi", HOMES) == ["Studio"]
     assert near_names("4bedroomhose", HOMES)[0] == "4BedroomHouse"
 
 
-def test_a_word_like_none_is_offered_none() -> None:
+def test_a_word_unlike_all_others_gets_no_suggestion() -> None:
     assert near_names("zzz", HOMES) == []
     assert did_you_mean("zzz", HOMES) == ""
     assert hint_of_choice("zzz", ("a", "b")) == "of a, b"
@@ -36,7 +36,7 @@ def test_a_long_strange_word_costs_nothing() -> None:
         ("sed", "seed"),
     ],
 )
-def test_a_field_there_is_not_is_offered_the_one_it_is_near(path: str, offer: str) -> None:
+def test_an_unknown_field_is_answered_with_the_nearest(path: str, offer: str) -> None:
     with pytest.raises(BadRecipe, match=rf"no such field, did you mean.* {offer}\b"):
         recipe_from_name("fast", {path: "1"})
 
@@ -45,6 +45,6 @@ def test_every_field_is_named_as_set_takes_it() -> None:
     recipe = Recipe()
     for path in field_paths():
         group, _, field = path.partition(".")
-        held = getattr(recipe, group)
-        assert hasattr(held, field) if field else True, path
+        values = getattr(recipe, group)
+        assert hasattr(values, field) if field else True, path
     assert {"seed", "light.spp", "dress.catalogue"} <= set(field_paths())

@@ -13,7 +13,7 @@ def test_bytes_are_gltfs_normals_of_unit_length() -> None:
     np.testing.assert_allclose(normals[0], [0, 0, 1], atol=0.006)
     assert normals[1, 0] > 0.99
     assert normals[1, 2] >= 0.99 * MIN_Z
-    np.testing.assert_array_equal(normals[2], [0, 0, 1])  # black says nothing
+    np.testing.assert_array_equal(normals[2], [0, 0, 1])  # black is no normal
 
 
 def test_the_scale_multiplies_the_slopes() -> None:
@@ -32,7 +32,7 @@ def test_nothing_leans_into_the_surface() -> None:
 
 
 @pytest.mark.parametrize("mirrored", [False, True])
-def test_tangents_lie_along_u_and_v_whatever_the_triangle(mirrored: bool) -> None:
+def test_tangents_are_along_u_and_v_for_any_triangle(mirrored: bool) -> None:
     rng = np.random.default_rng(1)
     corners = rng.normal(size=(50, 3, 3))
     u_axis, v_axis = np.array([-1.0 if mirrored else 1.0, 0, 0]), np.array([0, 1.0, 0])

@@ -1,4 +1,4 @@
-"""Ranges of numbers as a command line names them."""
+"""Ranges of numbers on the command line."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ def test_a_word_is_a_number_or_two_with_dots_between(word, ends):
     assert range_of(word) == ends
 
 
-def test_the_ends_of_a_range_are_text_where_they_are_no_whole_numbers():
+def test_the_ends_of_a_range_are_text_if_they_are_no_whole_numbers():
     assert ends_of("0.5..1.2") == ("0.5", "1.2")
     assert ends_of("0.5") == ("0.5", "0.5")
 
@@ -26,6 +26,6 @@ def test_seeds_are_named_in_order_and_once():
 
 
 @pytest.mark.parametrize("words", ["", "x", "0", "4..2", "1..11", "1,", "9" * 10])
-def test_what_names_no_seeds_says_what_was_expected(words):
+def test_an_invalid_range_of_seeds_explains_the_syntax(words):
     with pytest.raises(ValueError, match="expected"):
         seeds_of(words, least=1, max_seeds=10)

@@ -1,4 +1,4 @@
-"""Every number of a recipe has two ends, and a recipe of before is a recipe still."""
+"""Every number of a recipe has two bounds, and old recipes remain valid."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ def _numbers(schema: dict[str, Any], place: str, definitions: dict[str, Any]) ->
 
 def test_every_number_of_a_recipe_has_a_lower_and_an_upper_bound():
     schema = Recipe.model_json_schema()
-    found = dict(_numbers(schema, "", schema["$defs"]))
-    assert len(found) > 60
-    for place, number in found.items():
+    ranges = dict(_numbers(schema, "", schema["$defs"]))
+    assert len(ranges) > 60
+    for place, number in ranges.items():
         assert {"maximum", "exclusiveMaximum"} & set(number), place
         assert {"minimum", "exclusiveMinimum"} & set(number), place
 
@@ -44,7 +44,7 @@ def test_a_recipe_that_would_never_end_is_refused(setting):
         recipe_from_name("fast", {path: text})
 
 
-def test_a_picture_beyond_memory_is_refused_and_a_large_one_is_not():
+def test_a_picture_beyond_memory_is_refused_and_a_large_one_is_accepted():
     edge = {"image.width_px": "16384", "image.height_px": "16384"}
     with pytest.raises(BadRecipe, match="pixels"):
         recipe_from_name("fast", edge)
@@ -63,7 +63,7 @@ def test_a_lens_changes_the_digest_of_cameras():
     plain, bent = recipe_from_name("fast"), recipe_from_name("fast", {"lens.preset": "kinect"})
     assert bent.digest("cameras", "lens") != plain.digest("cameras", "lens")
     assert bent.digest("cameras") == plain.digest("cameras")
-    # A stored recipe that names no lens is a pin-hole's.
+    # A stored recipe without a lens is a pinhole.
     without = plain.model_dump(mode="json")
     del without["lens"]
     assert Recipe.model_validate(without) == plain
@@ -78,7 +78,7 @@ def test_a_lens_changes_the_digest_of_cameras():
         ({"lens.preset": "gopro"}, "lens.preset"),
     ],
 )
-def test_a_lens_that_does_not_fit_is_refused_in_one_line(settings, words):
+def test_an_invalid_lens_is_refused_in_one_line(settings, words):
     with pytest.raises(BadRecipe, match=words) as error:
         recipe_from_name("fast", settings)
     assert "\n" not in str(error.value)
@@ -87,7 +87,8 @@ def test_a_lens_that_does_not_fit_is_refused_in_one_line(settings, words):
 @pytest.mark.parametrize(
     ("settings", "hfov_deg", "score_px"),
     [
-        # 60 degrees across, as Roberts et al. 2021 say; 86 of a D455, as its data sheet says.
+        # 60 degrees horizontally, according to Roberts et al. 2021; 86 for a D455, by its data
+        # sheet.
         ({"lens.preset": "hypersim"}, 60.0, (640, 480)),
         ({"lens.preset": "d455", "image.width_px": "424"}, 86.0, (640, 362)),
     ],
@@ -100,6 +101,6 @@ def test_views_are_chosen_by_the_field_of_view_of_the_lens(settings, hfov_deg, s
 
 
 @pytest.mark.parametrize("lens", [{}, {"lens.model": "radtan", "lens.k1": "-0.1"}])
-def test_views_of_a_lens_without_a_focal_length_are_chosen_by_their_own(lens):
+def test_views_of_a_lens_without_a_focal_length_are_chosen_by_its_rays(lens):
     recipe = recipe_from_name("preview", lens)
     assert recipe.judged_cameras == recipe.cameras

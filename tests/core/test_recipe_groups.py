@@ -1,4 +1,4 @@
-"""Groups of the recipe: the steps that depend on them, and a group that is added in two files."""
+"""Groups of the recipe: dependent steps, and a group added in two files."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pbrs_farm.core.recipe import groups_of_step, picture_groups
 from pbrs_farm.prepare import passes
 from pbrs_farm.run import plan
 
-# A module of its own, and recipe.py with a line more: its import and its field.
+# A separate module, and one more line in recipe.py: its import and its field.
 ADDED = """
 import sys
 from pathlib import Path
@@ -70,7 +70,7 @@ def test_a_group_is_added_in_its_module_and_the_recipe() -> None:
     assert "# per metre" in done.stdout
 
 
-def test_every_step_of_a_group_is_one_of_the_plan() -> None:
+def test_every_step_of_a_group_exists_in_the_plan() -> None:
     names = {step for name, group in recipe.groups() for step in group.steps}
     assert names == set(plan.STEPS)
     assert set(passes.GROUPS) <= set(picture_groups())

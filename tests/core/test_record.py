@@ -1,4 +1,4 @@
-"""Tables beside the code: what is wrong in one is named by its file and entry."""
+"""Errors in tables beside the code name file and entry."""
 
 from __future__ import annotations
 
@@ -10,12 +10,12 @@ import pytest
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.record import Record, read_csv, read_toml
 from pbrs_farm.dress import furniture, style
-from pbrs_farm.dress.furniture import _Furniture
-from pbrs_farm.dress.style import _Styles
+from pbrs_farm.dress.furniture import FurnitureTable
+from pbrs_farm.dress.style import StyleTable
 from pbrs_farm.generate.furnish import briefs
-from pbrs_farm.generate.furnish.briefs import _Brief
+from pbrs_farm.generate.furnish.briefs import BriefTable
 from pbrs_farm.read.builtin import builtin_home
-from pbrs_farm.read.builtin.builtin_home import _Home
+from pbrs_farm.read.builtin.builtin_home import BuiltinTable
 
 
 class _Row(Record):
@@ -44,27 +44,25 @@ def test_a_bad_row_of_a_csv_is_named(tmp_path: Path) -> None:
         ("woods = [", "woods = ", "Invalid|invalid|Expected|Unclosed"),
     ],
 )
-def test_what_is_wrong_in_the_styles_is_named(
-    tmp_path: Path, old: str, new: str, message: str
-) -> None:
+def test_faults_in_the_styles_are_named(tmp_path: Path, old: str, new: str, message: str) -> None:
     text = Path(style.__file__).with_name("style.toml").read_text("utf-8")
     assert old in text
     (tmp_path / "style.toml").write_text(text.replace(old, new, 1))
     with pytest.raises(BadInput, match=rf"style\.toml: (?:.*)(?:{message})"):
-        read_toml(tmp_path / "style.toml", _Styles)
+        read_toml(tmp_path / "style.toml", StyleTable)
 
 
 @pytest.mark.parametrize(
     ("module", "name", "kind", "old", "new", "message"),
     [
-        (furniture, "furniture", _Furniture, '"low bookcase", 0.4', '"high", 0.4', "living: no kind high"),
-        (furniture, "furniture", _Furniture, '"night stand"', '"nite"', "kinds nightstand alike 0: .*NYU40"),
-        (briefs, "briefs", dict[str, _Brief], "double_beds", "waterbeds", "bedroom groups bed of 0 make: .*waterbeds"),
-        (builtin_home, "builtin", _Home, '["rug", "0_0"', '["mat", "0_0"', "places: no piece mat"),
-        (builtin_home, "builtin", _Home, 'material = "clay"', 'material = "mud"', "plant: no material mud"),
+        (furniture, "furniture", FurnitureTable, '"low bookcase", 0.4', '"high", 0.4', "living: no kind high"),
+        (furniture, "furniture", FurnitureTable, '"night stand"', '"nite"', "kinds nightstand alike 0: .*NYU40"),
+        (briefs, "briefs", dict[str, BriefTable], "double_beds", "waterbeds", "bedroom groups bed of 0 make: .*waterbeds"),
+        (builtin_home, "builtin", BuiltinTable, '["rug", "0_0"', '["mat", "0_0"', "places: no piece mat"),
+        (builtin_home, "builtin", BuiltinTable, 'material = "clay"', 'material = "mud"', "plant: no material mud"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_in_a_table_is_named(
+def test_faults_in_a_table_are_named(
     tmp_path: Path, module: ModuleType, name: str, kind: type, old: str, new: str, message: str
 ) -> None:
     text = Path(str(module.__file__)).with_name(f"{name}.toml").read_text("utf-8")

@@ -10,7 +10,7 @@ SIZES = st.tuples(st.integers(1, 23), st.integers(1, 23))
 
 
 @given(SIZES, SIZES, st.integers(0, 255))
-def test_a_picture_of_one_colour_keeps_it(size, to, value):
+def test_a_picture_of_one_colour_is_unchanged(size, to, value):
     picture = np.full((size[1], size[0], 3), value, np.uint8)
     assert (resized_by_area(picture, *to) == value).all()
 
@@ -27,7 +27,7 @@ def test_parts_of_pixels_count_as_much_as_they_cover():
 
 
 @pytest.mark.parametrize("to", [(8, 6), (10, 7), (50, 30)])
-def test_light_is_averaged_as_it_is_and_keeps_its_type(to):
+def test_light_is_averaged_linearly_and_keeps_its_type(to):
     light = np.random.default_rng(1).normal(0, 100, (24, 40, 3)).astype(np.float32)
     small = resized_by_area(light, *to)
     assert small.dtype == np.float32
@@ -46,12 +46,12 @@ def test_it_is_the_box_filter_of_openimageio_within_rounding(to):
     ours, theirs = resized_by_area(picture, *to), resized(picture, *to)
     if 40 % to[0] == 0 and 24 % to[1] == 0:
         assert np.abs(ours.astype(int) - theirs).max() <= 1
-    # The mean is kept whatever the grid.
+    # The mean is preserved for any grid.
     assert ours.mean() == pytest.approx(picture.mean(), abs=1)
 
 
 @given(SIZES, SIZES)
-def test_nearest_keeps_values_and_picks_the_pixel_whose_centre_is_nearest(size, to):
+def test_nearest_keeps_values_and_picks_the_pixel_with_the_nearest_centre(size, to):
     rows = np.arange(size[1])[:, None] * 100 + np.arange(size[0])
     small = resized_nearest(rows, *to)
     for r in range(to[1]):

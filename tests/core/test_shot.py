@@ -1,4 +1,4 @@
-"""Ids of views: what is made is parsed again, partners differ in one part, and seeds are shared as said."""
+"""Ids of views: built ids are parsed again, partners differ in one part, and seeds are shared by definition."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def test_an_id_is_parsed_into_its_shot(shot: Shot) -> None:
     assert Shot.of_row(shot.id, {"rig": rig}) == shot
 
 
-def test_ids_are_as_they_are_stored() -> None:
+def test_ids_have_their_stored_form() -> None:
     assert Shot("0_1_2", eye="right").id == "0_1_2_right"
     assert Shot.of_frame(12).id == "frame_00012"
     assert Shot.of_frame(12, "top").id == "frame_00012_top"

@@ -1,4 +1,4 @@
-"""What strangers wrote is one line that can be printed, wherever it is shown."""
+"""Untrusted text is one printable line wherever it is shown."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def test_a_name_is_one_short_line_without_controls(text):
 
 
 @pytest.mark.parametrize("text", ["Wohnküche", "Спальня", "寝室", "غرفة", "ห้องนอน", "a  b 🛏️"])
-def test_a_name_in_any_script_stays_what_it_is(text):
+def test_a_name_in_any_script_is_unchanged(text):
     assert shown(text) == text
 
 
@@ -43,7 +43,7 @@ def test_a_long_name_keeps_its_ends():
 
 
 @pytest.mark.parametrize("text", HOSTILE)
-def test_errors_and_notes_are_one_line_whatever_they_quote(text):
+def test_errors_and_notes_are_one_line_for_any_quoted_text(text):
     for error in (BadHouse(text, text, text, hint=text), PbrsError(text)):
         assert len(str(error).splitlines()) == 1
         assert len(str(error)) <= 2 * MAX_MESSAGE + 10
@@ -57,9 +57,9 @@ def test_errors_and_notes_are_one_line_whatever_they_quote(text):
 def test_a_name_cannot_forge_a_line_of_the_console(capsys):
     for text in HOSTILE:
         warn(f"room {text}")
-    told = capsys.readouterr().err
-    assert told.count("\n") == len(HOSTILE)
-    assert all(line.startswith("pbrs-farm: ") for line in told.splitlines())
+    output = capsys.readouterr().err
+    assert output.count("\n") == len(HOSTILE)
+    assert all(line.startswith("pbrs-farm: ") for line in output.splitlines())
     echo("one\ntwo \x1b[31m\u202e")
     assert capsys.readouterr().out == "one\ntwo  [31m \n"
     assert printable("a\nb") == "a\nb"

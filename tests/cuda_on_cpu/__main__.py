@@ -1,4 +1,4 @@
-"""Build the libraries and become a command that finds them; see the package."""
+"""Build the libraries and exec a command that finds them; see the package."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def main(command: list[str]) -> None:
 
 
 def build() -> None:
-    """Both libraries, anew where their source has changed; kernels translated before go with them."""
+    """Build both libraries if their source has changed, and delete translated kernels with them."""
     import embreex
 
     embree = next((Path(embreex.__file__).parents[1] / "embreex.libs").glob("libembree4*.so*"))
@@ -58,11 +58,11 @@ def _drjit() -> Path:
 
 
 def _other_calls() -> str:
-    """C of the driver's functions that Dr.Jit asks for and driver.c lacks: they do nothing."""
+    """C stubs of the driver's functions that Dr.Jit looks up and driver.c lacks."""
     library = _drjit().read_bytes()
-    asked = {name.decode() for name in re.findall(rb"\0(cu[A-Z]\w+)(?=\0)", library)}
+    names = {name.decode() for name in re.findall(rb"\0(cu[A-Z]\w+)(?=\0)", library)}
     ours = set(re.findall(r"^int (cu\w+)\(", (HERE / "driver.c").read_text(), re.MULTILINE))
-    return "".join(f"int {name}(void) {{ return 0; }}\n" for name in sorted(asked - ours))
+    return "".join(f"int {name}(void) {{ return 0; }}\n" for name in sorted(names - ours))
 
 
 if __name__ == "__main__":

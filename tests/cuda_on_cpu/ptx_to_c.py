@@ -1,10 +1,10 @@
-"""Translate the kernels that Dr.Jit writes in PTX to C: one function a kernel, that one thread runs.
+"""Translate Dr.Jit's PTX kernels to C: one function per kernel, run for one thread.
 
-Covers what Dr.Jit 1.5 emits for our kernels; an instruction that it does not know stops it with its line.
+Covers the output of Dr.Jit 1.5 for our kernels; an unknown instruction is an error with its line.
 Registers become variables of the same width, predicates bytes. Approximate instructions are computed
-exactly. A thread is a warp of its own. (PTX ISA 8.7, https://docs.nvidia.com/cuda/parallel-thread-execution)
+exactly. Each thread is a separate warp. (PTX ISA 8.7, https://docs.nvidia.com/cuda/parallel-thread-execution)
 
-    python ptx_to_c.py KERNEL.ptx KERNEL.c
+python ptx_to_c.py KERNEL.ptx KERNEL.c
 """
 
 from __future__ import annotations
@@ -49,7 +49,7 @@ HIT: Final = {
     "get_primitive_idx": ("hit.primitive", "u32"), "get_instance_id": ("hit.instance", "u32"),
     "get_sbt_data_pointer": ("hit.record", "u64"),
 }  # fmt: skip
-_FIRST_RAY, _AFTER_RAY = 2, 10  # arguments of traverse that are origin, direction and distances
+_FIRST_RAY, _AFTER_RAY = 2, 10  # range of traverse's arguments for origin, direction and distances
 _SBT_OFFSET, _SBT_STRIDE = 13, 14
 
 
@@ -79,12 +79,12 @@ def _groups(pattern: str, text: str) -> tuple[str, ...]:
 
 
 def _operands(text: str) -> list[str]:
-    """Operands between the commas that stand in no bracket."""
+    """Operands separated by the commas outside brackets."""
     return [part.strip() for part in re.split(r",(?![^\[({]*[\])}])", text) if part.strip()]
 
 
 def _with_own_names(code: str) -> str:
-    """A body whose inner blocks are gone, their labels and registers named apart."""
+    """A body with its inner blocks inlined, their labels and registers renamed."""
     outside: list[str] = []
     inside: list[str] = []
     depth = n_blocks = 0
@@ -99,7 +99,7 @@ def _with_own_names(code: str) -> str:
                 block = re.sub(rf"(?<![%\w.]){label}\b", f"block{n_blocks}_{label}", block)
             names = re.findall(r"%\w+", " ".join(re.findall(r"\.reg[^;]*;", block)))
             for name in sorted(names, key=len, reverse=True):
-                # A name that ends in _ stands for many, numbered.
+                # A name that ends in _ represents several numbered ones.
                 ends = r"(?=\d|\s*<)" if name.endswith("_") else r"\b"
                 block = re.sub(name + ends, f"%block{n_blocks}{name[1:]}", block)
             outside.append(block)
@@ -131,11 +131,11 @@ class _Kernel:
             self._statement(" ".join(statement.split()))
         variables = [f"{C_TYPES[t]} {_variable(r)} = 0;" for r, t in self._types.items()]
         body = "\n  ".join([*variables, *self._arrays.values(), *self._lines])
-        given = "const char *params, const struct binding_table *table"
+        signature = "const char *params, const struct binding_table *table"
         return (
-            f"static void thread_{self._name}({given}, uint32_t ctaid, uint32_t ntid,"
+            f"static void thread_{self._name}({signature}, uint32_t ctaid, uint32_t ntid,"
             f" uint32_t tid, uint32_t nctaid) {{\n  struct hit hit = {{0}};\n  {body}\n}}\n"
-            f"void {self._name}({given}, uint32_t grid, uint32_t block) {{\n"
+            f"void {self._name}({signature}, uint32_t grid, uint32_t block) {{\n"
             f"  run_threads(thread_{self._name}, params, table, grid, block);\n}}"
         )
 
@@ -150,7 +150,7 @@ class _Kernel:
                 if "<" not in name:
                     self._types.setdefault(name, kind)
                     continue
-                # %r<9> and the like are made when they are met.
+                # %r<9> and the like are declared at their first use.
                 stem, n = _groups(r"(%\w+)\s*<(\d+)>", name)
                 if stem[1:] not in PREFIXES and stem != "%h":
                     self._types.update({f"{stem}{k}": kind for k in range(int(n))})
@@ -184,9 +184,9 @@ class _Kernel:
         if name in ("activemask", "match"):
             return self._assign(to[0], "1", "b32")
         if name == "shfl":
-            lane, _, other = to[0].partition("|")
+            lane, _, mask_register = to[0].partition("|")
             return self._assign(lane, self._value(to[1], kind), kind) + self._assign(
-                other, "0", "pred"
+                mask_register, "0", "pred"
             )
         if name == "vote":
             return self._assign(to[0], self._value(to[1], "pred"), kind)
@@ -236,7 +236,7 @@ class _Kernel:
             raise UnknownPtxError(operand)
         return f"(uint64_t) &{match[1]}[{self._value(match[2], 'u32')}]"
 
-    # Instructions of their own form.
+    # Instructions with a special form.
 
     def _load(self, op: list[str], to: list[str]) -> str:
         kind, registers = op[-1], _operands(to[0].strip("{}"))
@@ -256,15 +256,18 @@ class _Kernel:
 
     def _atomic(self, op: list[str], to: list[str]) -> str:
         kind, places = op[-1], to if op[0] == "red" else to[1:]
-        at, value = f"({C_TYPES[kind]} *) {self._address(places[0])}", self._value(places[1], kind)
+        address, value = (
+            f"({C_TYPES[kind]} *) {self._address(places[0])}",
+            self._value(places[1], kind),
+        )
         action = next((part for part in op[1:] if part in ("add", "or", "and", "exch")), "")
         if not action:
             raise KeyError(op[0])
         if kind == "f32":
-            before = {"add": f"add_f32({at}, {value})"}[action]
+            before = {"add": f"add_f32({address}, {value})"}[action]
         else:
             name = "exchange_n" if action == "exch" else f"fetch_{action}"
-            before = f"__atomic_{name}({at}, {value}, __ATOMIC_RELAXED)"
+            before = f"__atomic_{name}({address}, {value}, __ATOMIC_RELAXED)"
         return f"{before};" if op[0] == "red" else self._assign(to[0], before, kind)
 
     def _compare(self, op: list[str], to: list[str]) -> str:
@@ -318,24 +321,26 @@ class _Kernel:
         return self._assign(to[0], f"{a} {'<' if op[0] == 'min' else '>'} {b} ? {a} : {b}", kind)
 
     def _call(self, op: list[str], to: list[str]) -> str:
-        results, name, given = _operands(to[0].strip("()")), to[1], _operands(to[2].strip("()"))
+        results, name, arguments = _operands(to[0].strip("()")), to[1], _operands(to[2].strip("()"))
         if name in ("_optix_get_launch_index_x", "_optix_get_launch_dimension_x"):
             return self._assign(results[0], "tid" if "index" in name else "ntid", "u32")
         query = name.removeprefix("_optix_hitobject_")
         if query == "traverse":
-            ray = ", ".join(self._value(x, "f32") for x in given[_FIRST_RAY:_AFTER_RAY])
-            scene = self._value(given[1], "u64")
-            records = ", ".join(self._value(given[k], "u32") for k in (_SBT_OFFSET, _SBT_STRIDE))
+            ray = ", ".join(self._value(x, "f32") for x in arguments[_FIRST_RAY:_AFTER_RAY])
+            scene = self._value(arguments[1], "u64")
+            records = ", ".join(
+                self._value(arguments[k], "u32") for k in (_SBT_OFFSET, _SBT_STRIDE)
+            )
             return f"float ray[] = {{{ray}}}; traverse(&hit, table, {scene}, ray, {records});"
         if query == "get_attribute":
             return self._assign(
-                results[0], f"hit.attributes[{self._value(given[0], 'u32')}]", "u32"
+                results[0], f"hit.attributes[{self._value(arguments[0], 'u32')}]", "u32"
             )
         return self._assign(results[0], *HIT[query])
 
 
 def _is_unknown(op: list[str]) -> bool:
-    """Whether an instruction is a form of a known one that would be translated wrongly."""
+    """True for a variant of a known instruction that would be translated wrongly."""
     name = op[0]
     return (
         "sat" in op
@@ -347,7 +352,7 @@ def _is_unknown(op: list[str]) -> bool:
 
 
 def _is_another_float(op: list[str]) -> bool:
-    """Whether a number of one precision becomes the same of another."""
+    """True if a number changes its precision."""
     return (
         op[0] == "cvt"
         and all(kind.startswith("f") for kind in op[-2:])
@@ -360,7 +365,7 @@ def _variable(register: str) -> str:
 
 
 def _as_type(value: str, old: str, new: str) -> str:
-    """A value of one PTX type as the same bits, or the same number, of another."""
+    """A value of one PTX type converted to another, by bits or by number."""
     if C_TYPES[old] == C_TYPES[new]:
         return value
     if "f" in (old[0], new[0]) and "pred" not in (old, new):
@@ -371,7 +376,7 @@ def _as_type(value: str, old: str, new: str) -> str:
 
 
 def _expression(name: str, kind: str, values: list[str]) -> str:
-    """What an instruction computes of values of one type."""
+    """The C expression of an instruction on values of one type."""
     if name == "mov":
         return values[0]
     if name == "selp":
@@ -381,7 +386,7 @@ def _expression(name: str, kind: str, values: list[str]) -> str:
     if name == "copysign":
         return f"copysignf({values[1]}, {values[0]})"
     if name in ("div", "rem") and not kind.startswith("f"):
-        # A GPU does not stop at a division by 0.
+        # A GPU does not trap on a division by 0.
         return f"{values[1]} ? {values[0]} {BINARY[name]} {values[1]} : -1"
     if name in BINARY:
         return f"{values[0]} {BINARY[name]} {values[1]}"

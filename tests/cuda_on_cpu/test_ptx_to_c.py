@@ -1,4 +1,4 @@
-"""Kernels of Dr.Jit in PTX become C that says the same."""
+"""Dr.Jit's PTX kernels become equivalent C."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from tests.cuda_on_cpu.ptx_to_c import UnknownPtxError, c_of_ptx
 
 
 def lines_of(*statements: str) -> list[str]:
-    """The lines of C that statements become, their declarations left out."""
+    """The lines of C for the statements, without declarations."""
     body = "\n".join(f"    {statement}" for statement in statements)
     code = c_of_ptx(f".entry drjit_0(.param .align 8 .b8 params[16]) {{\n{body}\n}}")
     return [line.strip() for line in code.split("\n") if re.match(r"  (\{|if|\w+: ;)", line)]
@@ -49,7 +49,7 @@ def test_four_numbers_are_loaded_from_one_place() -> None:
     ]
 
 
-def test_blocks_have_labels_and_registers_of_their_own() -> None:
+def test_blocks_have_separate_labels_and_registers() -> None:
     block = ["{", ".reg .u32 %q;", "mov.u32 %q, %r1;", "bra done;", "done:", "}"]
     lines = lines_of(*block, *block)
     assert [line for line in lines if line.endswith(": ;")] == ["block1_done: ;", "block2_done: ;"]
@@ -58,8 +58,8 @@ def test_blocks_have_labels_and_registers_of_their_own() -> None:
 
 
 def test_a_ray_carries_origin_direction_and_distances() -> None:
-    given = ", ".join(["%u_z", "%rd1", *[f"%f{k}" for k in range(2, 11)], *["%r1"] * 5, "%u_z"])
-    call = f"call (%u_out_0), _optix_hitobject_traverse, ({given});"
+    arguments = ", ".join(["%u_z", "%rd1", *[f"%f{k}" for k in range(2, 11)], *["%r1"] * 5, "%u_z"])
+    call = f"call (%u_out_0), _optix_hitobject_traverse, ({arguments});"
     lines = lines_of(".reg.u32 %u_z, %u_out_0;", call)
     ray = ", ".join(f"v_f{k}" for k in range(2, 10))
     assert f"float ray[] = {{{ray}}}; traverse(&hit, table, v_rd1, ray, v_r1, v_r1);" in lines[0]
@@ -80,11 +80,11 @@ def test_a_ray_carries_origin_direction_and_distances() -> None:
         "atom.global.cas.b32 %r1, [%rd2], %r3, %r4;",
     ],
 )
-def test_what_is_not_known_is_named(ptx: str) -> None:
+def test_unknown_instructions_are_named(ptx: str) -> None:
     with pytest.raises(UnknownPtxError, match=re.escape(ptx.split()[0])):
         lines_of(ptx)
 
 
-def test_a_place_that_is_not_known_is_named() -> None:
+def test_an_unknown_place_is_named() -> None:
     with pytest.raises(UnknownPtxError, match="somewhere"):
         lines_of("ld.global.b32 %r1, [somewhere];")

@@ -126,7 +126,7 @@ def test_white_and_black_borders_are_cropped_and_nothing_else() -> None:
     assert registration_border(white) == (slice(10, 70), slice(12, 84))
 
 
-def test_the_border_is_out_of_the_histogram_unless_told(tmp_path: Path) -> None:
+def test_the_border_is_excluded_from_the_histogram_by_default(tmp_path: Path) -> None:
     for k in range(2):
         rgb, depth = photo(k)
         rgb[:2] = 255
@@ -193,7 +193,7 @@ def write_mat_empty(path: Path) -> Path:
     return path
 
 
-def test_wrong_mats_say_what_is_wrong(tmp_path: Path) -> None:
+def test_the_fault_of_a_wrong_mat_is_named(tmp_path: Path) -> None:
     good = write_mat(tmp_path / "good.mat").read_bytes()
     cases = {
         "cut.mat": (good[: len(good) // 2], "truncated"),
@@ -207,12 +207,12 @@ def test_wrong_mats_say_what_is_wrong(tmp_path: Path) -> None:
 
 
 def test_a_mat_with_other_tables_is_named(tmp_path: Path) -> None:
-    other = write_mat(tmp_path / "a.mat", images=np.zeros((3, 32, 24), np.uint8))
+    other_mat = write_mat(tmp_path / "a.mat", images=np.zeros((3, 32, 24), np.uint8))
     with pytest.raises(BadInput, match=r"images.*expected 4 axes"):
-        NyuMat(other)
-    other = write_mat(tmp_path / "b.mat", depths=np.zeros((3, 32, 25), np.float32))
+        NyuMat(other_mat)
+    other_mat = write_mat(tmp_path / "b.mat", depths=np.zeros((3, 32, 25), np.float32))
     with pytest.raises(BadInput, match=r"depths.*sizes differ"):
-        NyuMat(other)
+        NyuMat(other_mat)
     with h5py.File(tmp_path / "c.mat", "w") as file:
         file["labels"] = np.zeros(3)
     with pytest.raises(BadInput, match="images: missing"):

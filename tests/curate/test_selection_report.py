@@ -1,4 +1,4 @@
-"""The report shows what the run says, stands alone in one file, and survives missing pictures."""
+"""The report agrees with the run, is self-contained in one file, and tolerates missing pictures."""
 
 from __future__ import annotations
 
@@ -27,17 +27,17 @@ FIELDS = SelectionFields(min_colour=0.45, min_depth=0.5)
 
 @pytest.fixture
 def store() -> MemoryStore:
-    held = MemoryStore()
+    memory = MemoryStore()
     rng = np.random.default_rng(4)
     for k in range(8):
         view = f"0_0_{k}"
-        held.put(keys.view_key("a", view, "histogram.json"), record("a", view, rng).json_bytes())
+        memory.put(keys.view_key("a", view, "histogram.json"), record("a", view, rng).json_bytes())
     facts = {"source": {"attribution": "Model by A. & Co"}}
-    held.put(keys.house_key("a", "house.json"), json.dumps(facts).encode())
+    memory.put(keys.house_key("a", "house.json"), json.dumps(facts).encode())
     picture = np.full((24, 32, 3), 120, np.uint8)
-    held.put(keys.view_key("a", "0_0_0", "mlt_il_ol.png"), images.png_from_array(picture))
-    held.put(keys.view_key("a", "0_0_0", "depth.png"), images.png_from_array(picture[..., 0] * 9))
-    return held
+    memory.put(keys.view_key("a", "0_0_0", "mlt_il_ol.png"), images.png_from_array(picture))
+    memory.put(keys.view_key("a", "0_0_0", "depth.png"), images.png_from_array(picture[..., 0] * 9))
+    return memory
 
 
 def page(store: MemoryStore) -> str:
@@ -71,16 +71,16 @@ def test_the_numbers_are_those_of_the_run(store: MemoryStore) -> None:
 
 
 def test_a_home_a_room_or_a_photograph_called_script_is_escaped() -> None:
-    held, evil = MemoryStore(), "<script>alert(1)</script>"
+    memory, evil = MemoryStore(), "<script>alert(1)</script>"
     of_evil = record("a", "0_0_0", np.random.default_rng(4)).model_copy(update={"room_type": evil})
-    held.put(keys.view_key("a", "0_0_0", "histogram.json"), of_evil.json_bytes())
+    memory.put(keys.view_key("a", "0_0_0", "histogram.json"), of_evil.json_bytes())
     facts = {"source": {"attribution": evil}}
-    held.put(keys.house_key("a", "house.json"), json.dumps(facts).encode())
+    memory.put(keys.house_key("a", "house.json"), json.dumps(facts).encode())
     photographs = reference()
     names = {"ids": (evil,) * len(photographs.facts.ids), "source": evil}
     photographs = replace(photographs, facts=photographs.facts.model_copy(update=names))
-    selecting.select(held, photographs, FIELDS)
-    html = selection_report(held, photographs, FIELDS)
+    selecting.select(memory, photographs, FIELDS)
+    html = selection_report(memory, photographs, FIELDS)
     assert "<script" not in html
     assert html.count("&lt;script&gt;") >= 5
 
@@ -91,7 +91,7 @@ def test_words_in_a_chart_are_escaped() -> None:
     assert "<b>" not in chart
 
 
-def test_a_missing_picture_is_said(store: MemoryStore) -> None:
+def test_a_missing_picture_is_noted(store: MemoryStore) -> None:
     html = page(store)
     assert html.count("picture missing") == 2 * 7
     assert html.count("data:image/jpeg") == 2
@@ -117,26 +117,26 @@ def test_bars_of_a_distribution_add_up_to_the_views() -> None:
     assert heights["kept"] == pytest.approx(heights["rejected"])
 
 
-def test_bin_colours_lie_in_their_own_bins() -> None:
+def test_bin_colours_are_inside_their_bins() -> None:
     middle = bin_colours((4, 4, 2), "rgb").reshape(4, 4, 2, 3)
     assert middle[3, 0, 1].tolist() == [224, 32, 192]
     grey = bin_colours((2, 2, 2), "ycbcr").reshape(2, 2, 2, 3)
     assert grey[1].mean() > grey[0].mean()
 
 
-def test_what_was_refused_is_not_drawn_in_the_colour_of_what_was_kept() -> None:
+def test_refused_views_are_not_drawn_in_the_colour_of_kept_ones() -> None:
     scores = np.array(
         [0.9, 0.9, 0.9, 0.2]
-    )  # three in one cell above both limits, one refused there
-    kept = np.array([True, True, False, False])
-    drawn = str(joint(scores, scores, kept, (0.7, 0.7)))
+    )  # three in one cell above both limits, one of them refused
+    is_kept = np.array([True, True, False, False])
+    drawn = str(joint(scores, scores, is_kept, (0.7, 0.7)))
     assert drawn.count('class="kept"') == 1
     assert drawn.count('class="rejected"') == 2
     none = str(joint(scores, scores, np.zeros(4, bool), (0.7, 0.7)))
     assert 'class="kept"' not in none
 
 
-def test_room_types_are_types_whatever_rooms_are_called() -> None:
+def test_room_types_do_not_depend_on_room_names() -> None:
     names = ["Bedroom 2", "Chambre", "Kitchen", "Room 7", None]
     table = with_types(pa.table({"room_type": pa.array(names, pa.string())}))
     assert table["room_type"].to_pylist() == ["bedroom", "bedroom", "kitchen", "", ""]

@@ -1,4 +1,4 @@
-"""Selection reads stored histograms once, adds houses at their own cost, and never opens a picture."""
+"""Selection reads stored histograms once, adds houses at their own cost, and opens no picture."""
 
 from __future__ import annotations
 
@@ -28,10 +28,10 @@ LOW = SelectionFields(min_colour=0.2, min_depth=0.2)
 
 @pytest.fixture
 def store() -> MemoryStore:
-    held = MemoryStore()
-    put_house(held, "a", 4)
-    put_house(held, "b", 3)
-    return held
+    memory = MemoryStore()
+    put_house(memory, "a", 4)
+    put_house(memory, "b", 3)
+    return memory
 
 
 def rows(store: MemoryStore, run: str = "default") -> list[dict]:
@@ -63,7 +63,7 @@ def test_a_second_run_scores_nothing_and_changes_no_byte(store: MemoryStore) -> 
     assert after == before
 
 
-def test_a_new_house_costs_only_itself_and_gives_what_a_whole_run_gives(store: MemoryStore) -> None:
+def test_a_new_house_costs_only_itself_and_equals_a_whole_run(store: MemoryStore) -> None:
     selecting.select(store, reference(), LOW)
     put_house(store, "0", 2)
     assert selecting.select(store, reference(), LOW).n_scored_houses == 1
@@ -104,7 +104,7 @@ def test_a_house_that_is_gone_leaves_the_table(store: MemoryStore) -> None:
     assert {x["house"] for x in rows(store)} == {"a"}
 
 
-def test_another_reference_is_scored_anew(store: MemoryStore) -> None:
+def test_another_reference_is_scored_again(store: MemoryStore) -> None:
     selecting.select(store, reference(), LOW)
     assert selecting.select(store, reference(seed=3), LOW).n_scored_houses == 2
 
@@ -121,19 +121,23 @@ def test_a_damaged_or_missing_histogram_fails_its_view_and_no_other(store: Memor
 
 
 def test_a_reference_of_other_settings_is_named(store: MemoryStore) -> None:
-    other = reference(fields=HistogramFields(colour_bins=4, depth_bins=16, depth_max_m=8.0))
+    other_reference = reference(
+        fields=HistogramFields(colour_bins=4, depth_bins=16, depth_max_m=8.0)
+    )
     with pytest.raises(BadInput, match=r"nyu\.npz.*depth_max_m: 8.0 there, 10.0 here"):
-        selecting.select(store, other, LOW, reference_name="nyu.npz")
+        selecting.select(store, other_reference, LOW, reference_name="nyu.npz")
 
 
-def test_views_without_the_mode_are_scored_when_told_and_marked_else(store: MemoryStore) -> None:
+def test_views_without_the_mode_are_scored_on_request_and_marked_otherwise(
+    store: MemoryStore,
+) -> None:
     rng = np.random.default_rng(0)
     only_gl = record("d", "0_0_0", rng, modes=(Mode.OPENGL_DL, Mode.MLT_OL))
     store.put(keys.view_key("d", "0_0_0", "histogram.json"), only_gl.json_bytes())
     selecting.select(store, reference(), LOW)
     assert [x["reason"] for x in rows(store) if x["house"] == "d"] == ["unscored"]
-    told = SelectionFields(min_colour=0.2, min_depth=0.2, score_mode="mlt_ol")
-    summary = selecting.select(store, reference(), told)
+    fields = SelectionFields(min_colour=0.2, min_depth=0.2, score_mode="mlt_ol")
+    summary = selecting.select(store, reference(), fields)
     assert [x["mode"] for x in rows(store) if x["house"] == "d"] == ["mlt_ol"]
     assert summary.modes == {"mlt_il_ol": 7, "mlt_ol": 1}
 
@@ -169,9 +173,11 @@ def test_yield_falls_with_the_threshold_and_counts_both_scores(store: MemoryStor
     summary = selecting.select(store, reference(), LOW)
     scores = ("unlike-colour", "unlike-depth", "")
     good = [x for x in rows(store) if all(r in scores for r in x["reasons"].split(","))]
-    both = np.array([min(x["colour_score"], x["depth_score"]) for x in good])
+    lower_scores = np.array([min(x["colour_score"], x["depth_score"]) for x in good])
     assert list(summary.yield_both) == sorted(summary.yield_both, reverse=True)
-    assert summary.yield_both[50] == pytest.approx(np.sum(both > 0.5) / summary.views, abs=1e-6)
+    assert summary.yield_both[50] == pytest.approx(
+        np.sum(lower_scores > 0.5) / summary.views, abs=1e-6
+    )
 
 
 def test_the_yields_curve_agrees_with_the_card(store: MemoryStore) -> None:
@@ -184,7 +190,7 @@ def test_the_yields_curve_agrees_with_the_card(store: MemoryStore) -> None:
         assert summary.yield_both[round(100 * threshold)] == pytest.approx(share, abs=1e-6)
 
 
-def test_the_view_step_writes_what_selection_reads() -> None:
+def test_selection_reads_the_output_of_the_view_step() -> None:
     store, fields = MemoryStore(), HistogramFields()
     picture = np.full((6, 8, 3), 90, np.uint8)
     depth = np.full((6, 8), 1500, np.uint16)

@@ -1,4 +1,4 @@
-"""Rules leave out views that teach nothing: planes, black pictures, things that the edge cuts, twins."""
+"""Rules exclude useless views: planes, black pictures, items cut by the edge, twins."""
 
 from __future__ import annotations
 
@@ -30,11 +30,11 @@ def look(eye, towards, hfov_deg: float = 60.0) -> Camera:
 
 CAMERAS = {
     "a_room": look(EYE, (-1, -0.25, 0.4)),
-    # A hand's breadth beside it, hardly turned: the same picture.
+    # A few centimetres away, hardly turned: the same picture.
     "b_twin": look((3.02, 1.5, 1.5), (-1, -0.25, 0.42)),
-    # The same place, another direction.
+    # The same place in another direction.
     "c_other": look(EYE, (-0.3, -0.5, 1)),
-    # Straight up: the ceiling and nothing else.
+    # Straight up: only the ceiling.
     "d_ceiling": look(EYE, (0.01, 1, 0), 50),
 }
 
@@ -59,15 +59,15 @@ def numbers(root: Path, name: str) -> dict[str, float]:
     return {v.view: v.numbers.get(name, np.nan) for v in judged_by(finished_entries(root), [name])}
 
 
-def test_a_view_of_one_plane_is_left_out(root: Path) -> None:
-    found = numbers(root, "plane")
-    # By another way: the share of pixels with the most common instance, where that is flat.
+def test_a_view_of_a_single_plane_is_left_out(root: Path) -> None:
+    plane_numbers = numbers(root, "plane")
+    # Computed differently: the share of pixels with the most common instance, if that one is flat.
     house = next((root / "houses").iterdir())
-    for view, share in found.items():
+    for view, share in plane_numbers.items():
         depth = array_from_png((house / "views" / view / "depth.png").read_bytes())
         assert 0 < share <= (depth > 0).mean() + 0.02
-    assert found["d_ceiling"] > 0.95
-    assert found["a_room"] < 0.6
+    assert plane_numbers["d_ceiling"] > 0.95
+    assert plane_numbers["a_room"] < 0.6
     assert reasons(root, "plane")["d_ceiling"] == "one-plane"
     assert reasons(root, "plane")["a_room"] == ""
 
@@ -77,7 +77,7 @@ def test_a_black_picture_is_left_out(root: Path, tmp_path: Path) -> None:
     copy = shutil.copytree(root, tmp_path / "copy")
     for name, level in (("a_room", 1), ("c_other", 2)):
         picture = np.full((SIZE[1], SIZE[0], 3), level, np.uint8)
-        picture[:20] = 200  # a bright window does not lighten the rest
+        picture[:20] = 200  # a bright window does not lighten the other pixels
         file = next((copy / "houses").iterdir()) / "views" / name / "mlt_il_ol.png"
         file.write_bytes(png_from_array(picture))
     assert reasons(copy, "black") == {
@@ -89,42 +89,42 @@ def test_a_black_picture_is_left_out(root: Path, tmp_path: Path) -> None:
 
 
 def test_of_near_twins_the_first_stays(root: Path) -> None:
-    found = reasons(root, "twins")
-    assert found == {"a_room": "", "b_twin": "twin", "c_other": "", "d_ceiling": ""}
+    twin_reasons = reasons(root, "twins")
+    assert twin_reasons == {"a_room": "", "b_twin": "twin", "c_other": "", "d_ceiling": ""}
     share = numbers(root, "twins")
     assert share["b_twin"] > 0.9
     assert share["c_other"] < 0.1
 
 
-def test_things_that_the_edge_cuts_are_counted(root: Path, tmp_path: Path) -> None:
+def test_items_cut_by_the_edge_are_counted(root: Path, tmp_path: Path) -> None:
     house = next((root / "houses").iterdir())
-    found = numbers(root, "cut")
-    for view, share in found.items():
+    cut_numbers = numbers(root, "cut")
+    for view, share in cut_numbers.items():
         rows = json.loads((house / "views" / view / "view.json").read_text())["instances"]
         things = [r for r in rows if r["kind"] not in ("wall", "floor", "ceiling", "ground")]
         things = [r for r in things if r["fraction"] >= 0.01]
         cut = [r for r in things if r["truncated"]]
         assert share == pytest.approx(len(cut) / len(things) if things else 0, abs=1e-9)
-    assert max(found.values()) > 0
+    assert max(cut_numbers.values()) > 0
 
 
 def test_a_view_counts_for_the_first_rule_that_it_breaks_and_rules_are_off(root: Path) -> None:
     assert set(reasons(root).values()) == {""}
     # Two ceilings are planes before they are twins.
-    found = judged_by(finished_entries(root), ["twins", "plane"])
-    assert [v.reason for v in found] == ["", "twin", "", "one-plane"]
+    verdict_rows = judged_by(finished_entries(root), ["twins", "plane"])
+    assert [v.reason for v in verdict_rows] == ["", "twin", "", "one-plane"]
     with pytest.raises(BadInput, match=r"--by: dull: no such rule.*black, plane, cut, twins"):
         judged_by([], ["dull"])
 
 
-def test_the_verb_counts_each_rule_and_exports_what_is_left(root, tmp_path, capsys) -> None:
+def test_the_verb_counts_each_rule_and_exports_the_kept_views(root, tmp_path, capsys) -> None:
     assert main(["select", str(root), "--by", "plane", "twins", "--run", "taught"]) == 0
-    said = capsys.readouterr().out
-    assert "2 of 4 views kept" in said
-    assert "1  one-plane" in said
-    assert "1  twin" in said
+    output = capsys.readouterr().out
+    assert "2 of 4 views kept" in output
+    assert "1  one-plane" in output
+    assert "1  twin" in output
     assert export(root, tmp_path / "coco", "coco", selection="taught")[0] == 2
-    # Among what another run keeps.
+    # Among the views of another selection.
     assert main(["select", str(root), "--by", "plane", "--selection", "taught", "--run", "b"]) == 0
     assert "2 of 2 views kept" in capsys.readouterr().out
     assert json.loads((root / "selection.json").read_text())["reasons"] == {"one-plane": 0}

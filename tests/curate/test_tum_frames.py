@@ -1,4 +1,4 @@
-"""Frames of the TUM RGB-D benchmark: which pictures make a pair, and which frames are taken."""
+"""Frames of the TUM RGB-D benchmark: pairing of pictures, and choice of frames."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ SECONDS = 1305031102.0
 
 
 def _taken(folder: Path) -> list[tuple[float, float]]:
-    """Seconds after the first of colour and depth of each frame, in hundredths."""
+    """Seconds after the first colour and depth of each frame, rounded to hundredths."""
     return [
         (round(float(rgb.stem) - SECONDS, 2), round(float(depth.stem) - SECONDS, 2))
         for rgb, depth in frames_of(folder)
@@ -28,11 +28,11 @@ def test_pairs_are_each_others_nearest_within_two_hundredths(tmp_path: Path) -> 
     depth = [SECONDS + s for s in (0.01, 2.03, 4.01, 3.99, 6.01)]
     # 2 and 2.03 are too far apart; of 6 and 6.01 only the latter has depth; 3.99 or 4.01 is 4's.
     times = _taken(write_sequence(tmp_path, rgb, depth))
-    assert [at for at, _ in times] == [0, 4, 6.01]
+    assert [time for time, _ in times] == [0, 4, 6.01]
     assert times[1][1] in (3.99, 4.01)
 
 
-def test_a_frame_is_taken_where_the_camera_has_moved_or_turned(tmp_path: Path) -> None:
+def test_a_frame_is_taken_after_the_camera_has_moved_or_turned(tmp_path: Path) -> None:
     rgb = [SECONDS + s / 10 for s in range(6)]
     half = math.radians(11) / 2
     turned = f"0 {math.sin(half)} 0 {math.cos(half)}"
@@ -40,16 +40,16 @@ def test_a_frame_is_taken_where_the_camera_has_moved_or_turned(tmp_path: Path) -
         f"{rgb[0]} 0 0 0 0 0 0 1",
         f"{rgb[1]} 0.06 0 0 0 0 0 1",  # 6 cm: not yet
         f"{rgb[2]} 0.11 0 0 0 0 0 1",  # 11 cm from the first: taken
-        f"{rgb[3]} 0.17 0 0 0 0 0 -1",  # the same turn by the other sign, 6 cm from that: not yet
+        f"{rgb[3]} 0.17 0 0 0 0 0 -1",  # the same rotation with the opposite sign, 6 cm away: not yet
         f"{rgb[4]} 0.17 0 0 {turned}",  # turned by 11 degrees: taken
-        # Without a pose, and not a second later: left.
+        # Without a pose, and less than a second later: skipped.
     ]
-    assert [at for at, _ in _taken(write_sequence(tmp_path, rgb, rgb, poses=poses))] == [0, 0.2, 0.4]  # fmt: skip
+    assert [time for time, _ in _taken(write_sequence(tmp_path, rgb, rgb, poses=poses))] == [0, 0.2, 0.4]  # fmt: skip
 
 
 def test_without_poses_a_frame_a_second_is_taken(tmp_path: Path) -> None:
     rgb = [SECONDS + s / 4 for s in range(10)]
-    assert [at for at, _ in _taken(write_sequence(tmp_path, rgb, rgb))] == [0, 1, 2]
+    assert [time for time, _ in _taken(write_sequence(tmp_path, rgb, rgb))] == [0, 1, 2]
 
 
 def test_depth_is_in_units_of_a_fifth_of_a_millimetre(tmp_path: Path) -> None:
@@ -57,10 +57,10 @@ def test_depth_is_in_units_of_a_fifth_of_a_millimetre(tmp_path: Path) -> None:
     sequence = write_sequence(tmp_path / "rgbd_dataset_freiburg2_desk", times, times, depth_m=1.5)
     assert has_depth(tmp_path)
     pairs = pairs_in(tmp_path)
-    assert [pair.id for pair in pairs] == [f"{sequence.name}/{at:.6f}" for at in times]
+    assert [pair.id for pair in pairs] == [f"{sequence.name}/{time:.6f}" for time in times]
     photo = photo_from_pair(pairs[0], depth_scale=None, sun_rgbd=False)
     assert photo.depth_mm[0, 0] == 1500
-    # What a user says of the units counts more.
+    # The user's units take precedence.
     assert photo_from_pair(pairs[0], depth_scale=1000, sun_rgbd=False).depth_mm[0, 0] == 7500
 
 
@@ -68,9 +68,7 @@ def test_depth_is_in_units_of_a_fifth_of_a_millimetre(tmp_path: Path) -> None:
     ("name", "fx"),
     [("rgbd_dataset_freiburg1_desk", 517.3), ("fr2_xyz", 520.9), ("Freiburg3", 535.4), ("desk", None), ("fr12", None), ("zephyr1x", None)],
 )  # fmt: skip
-def test_a_camera_is_known_by_the_sequences_name(
-    tmp_path: Path, name: str, fx: float | None
-) -> None:
+def test_the_sequences_name_gives_the_camera(tmp_path: Path, name: str, fx: float | None) -> None:
     K = camera_of_sequence(write_sequence(tmp_path / name, [0.0], [0.0]))
     assert (K and K[0]) == fx
 

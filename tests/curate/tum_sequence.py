@@ -16,7 +16,7 @@ def write_sequence(
     folder: Path, rgb_s: Sequence[float], depth_s: Sequence[float], *, poses: Sequence[str] = (),
     size: tuple[int, int] = (90, 60), depth_m: float = 2.0,
 ) -> Path:  # fmt: skip
-    """Pictures at these seconds, depth of a wall straight ahead, and lines of groundtruth.txt."""
+    """Write pictures at these seconds, depth of a wall straight ahead, and lines of groundtruth.txt."""
     width, height = size
     for name, times in (("rgb", rgb_s), ("depth", depth_s)):
         (folder / name).mkdir(parents=True, exist_ok=True)

@@ -2,10 +2,10 @@
 
 A block of commands or of Python has a comment above it, which neither GitHub nor the site shows:
 
-    <!-- commands: run -->                  as it stands
-    <!-- commands: small -->                on small pictures, few homes and few steps
-    <!-- commands: needs docker -->         not by a test; NEEDS says what may be needed
-    <!-- commands: small; needs browser: board -->    but for lines in which the pattern (a regex) is found
+    <!-- commands: run -->                  unchanged
+    <!-- commands: small -->                with small pictures, few homes and few steps
+    <!-- commands: needs docker -->         not by a test; NEEDS lists the valid words
+    <!-- commands: small; needs browser: board -->    except for lines that match the pattern (a regex)
     <!-- commands: excerpt -->              a part of a file or of a session
 
 Other blocks name their language: text, json, toml, csv.
@@ -36,7 +36,7 @@ NEEDS: Final = {
     "package": "a package that none of our extras brings",
     "hours": "hours",
 }
-"""What a command may need that a test of the pages does not have."""
+"""Requirements of commands that the tests of pages do not have."""
 
 _FENCE: Final = re.compile(r"^( *)```([^\n`]*)\n(.*?)^ *```[ ]*$", re.MULTILINE | re.DOTALL)
 _MARK: Final = re.compile(r"<!-- commands: (.+?) -->\n\s*\Z")
@@ -45,7 +45,7 @@ COMMANDS: Final = ("sh", "python")
 
 @dataclass(frozen=True, slots=True)
 class Block:
-    """A fenced block. mark: of its comment, "" where it has none; line: of its fence in the page."""
+    """A fenced block. mark: the text of its comment, "" without one; line: of its fence in the page."""
 
     page: Path
     line: int
@@ -55,15 +55,15 @@ class Block:
 
     @property
     def name(self) -> str:
-        """For people: page and line."""
+        """Page and line, for messages."""
         return f"{self.page.relative_to(REPO)}:{self.line}"
 
     @property
     def lines(self) -> list[str]:
-        """The commands of a sh block, comments and blank lines apart; a line that goes on is one."""
+        """The commands of a sh block without comments and blank lines; continued lines are joined."""
         whole = re.sub(r"\\\n\s*", " ", self.text)
-        found = [re.sub(r"(?:^|\s)#.*", "", line).strip() for line in whole.splitlines()]
-        return [line for line in found if line]
+        lines = [re.sub(r"(?:^|\s)#.*", "", line).strip() for line in whole.splitlines()]
+        return [line for line in lines if line]
 
     def how(self, line: str = "") -> str:
         """How a line of the block is run: "run", "small", "excerpt", or "needs WHAT"."""
@@ -75,20 +75,20 @@ class Block:
         return first
 
     def faults(self) -> list[str]:
-        """What is wrong with the block's mark."""
+        """Faults of the block's mark."""
         if self.language not in COMMANDS:
             return [] if self.language else ["has no language (sh, python, text, json, toml, csv)"]
         if not self.mark:
             return ["has no mark: see tests/docs/fenced.py"]
         first, *exceptions = self.mark.split("; ")
-        found = [] if _is_how(first) else [f"is marked {first!r}"]
+        faults = [] if _is_how(first) else [f"is marked {first!r}"]
         for exception in exceptions:
             need, colon, pattern = exception.partition(": ")
             if not colon or not _is_how(need):
-                found.append(f"is marked {exception!r}")
+                faults.append(f"is marked {exception!r}")
             elif not any(re.search(pattern, line) for line in self.lines):
-                found.append(f"no line has {pattern!r}")
-        return found
+                faults.append(f"no line has {pattern!r}")
+        return faults
 
 
 def _is_how(word: str) -> bool:
@@ -98,14 +98,14 @@ def _is_how(word: str) -> bool:
 def blocks_of(page: Path) -> list[Block]:
     """The fenced blocks of a page, in order."""
     text = page.read_text(encoding="utf-8")
-    found = []
+    page_blocks = []
     for match in _FENCE.finditer(text):
         mark = _MARK.search(text[: match.start()])
         indent = len(match[1])
         body = "".join(line[indent:] or "\n" for line in match[3].splitlines(keepends=True))
         line = text.count("\n", 0, match.start()) + 1
-        found.append(Block(page, line, match[2].strip(), body, mark[1] if mark else ""))
-    return found
+        page_blocks.append(Block(page, line, match[2].strip(), body, mark[1] if mark else ""))
+    return page_blocks
 
 
 def every_block() -> list[Block]:
@@ -119,5 +119,5 @@ def name_of(page: Path) -> str:
 
 def blocks(page: str) -> list[tuple[str, str]]:
     """(language, text) of each block of commands of a page."""
-    found = blocks_of(REPO / "docs" / page)
-    return [(b.language, b.text) for b in found if b.language in COMMANDS]
+    page_blocks = blocks_of(REPO / "docs" / page)
+    return [(b.language, b.text) for b in page_blocks if b.language in COMMANDS]

@@ -1,4 +1,4 @@
-"""The examples in docstrings run and print what they say; nine public names in ten have one."""
+"""The examples in docstrings run and print the shown output; nine public names in ten have one."""
 
 from __future__ import annotations
 
@@ -16,9 +16,9 @@ def test_nine_public_names_in_ten_have_an_example() -> None:
 
 
 def test_the_examples_of_cameras_and_recipes_run(tmp_path: Path) -> None:
-    found = list(faults(tmp_path, of_homes=False))
-    assert len(found) >= 12
-    assert [fault for _name, fault in found if fault] == []
+    example_faults = list(faults(tmp_path, of_homes=False))
+    assert len(example_faults) >= 12
+    assert [fault for _name, fault in example_faults if fault] == []
 
 
 @pytest.mark.pages
@@ -26,6 +26,6 @@ def test_the_examples_of_homes_and_frames_run(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
-    found = list(faults(tmp_path, of_homes=True))
-    assert len(found) >= 60
-    assert "".join(fault for _name, fault in found) == ""
+    example_faults = list(faults(tmp_path, of_homes=True))
+    assert len(example_faults) >= 60
+    assert "".join(fault for _name, fault in example_faults) == ""

@@ -1,4 +1,4 @@
-"""Files of deploy/cloud: their commands parse, and their variables are ones that the farm reads."""
+"""Files of deploy/cloud: their commands parse, and the farm reads their variables."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ OPENJD = yaml.safe_load((CLOUD / "openjd.yaml").read_text("utf-8"))
 
 
 def _filled(words: list[Any]) -> list[str]:
-    """Words of a template with 1 in place of numbers and a name in place of texts."""
+    """Arguments of a template with 1 in place of numbers and a name in place of texts."""
     values = {"Task.Param.Shard": "1", "Param.Shards": "2"}
     return [re.sub(r"\{\{(.*?)\}\}", lambda m: values.get(m[1], "x"), str(word)) for word in words]
 
@@ -51,14 +51,14 @@ def test_a_command_parses(name: str) -> None:
 def test_variables_are_read_by_the_farm() -> None:
     fields = {f"PBRS_FARM_{name.upper()}" for name in FarmConfig.__dataclass_fields__}
     texts = [Path(module.__file__ or "").read_text("utf-8") for module in (settings, config)]
-    known = fields | {name for text in texts for name in re.findall(r"PBRS_[A-Z0-9_]+", text)}
+    read_names = fields | {name for text in texts for name in re.findall(r"PBRS_[A-Z0-9_]+", text)}
     for place in ("environment", "secrets"):
-        assert {row["name"] for row in BATCH[place]} <= known
-    assert {*SKY["envs"], *SKY["secrets"]} <= known
+        assert {row["name"] for row in BATCH[place]} <= read_names
+    assert {*SKY["envs"], *SKY["secrets"]} <= read_names
     assert not [name for name in SKY["secrets"].values() if name is not None]
 
 
 def test_every_instance_leaves_in_the_time_it_is_given() -> None:
-    # ECS kills a container 30 s after it is told to end.
-    given = {row["name"]: row["value"] for row in BATCH["environment"]}
-    assert float(given["PBRS_FARM_GRACE_S"]) < 30
+    # ECS kills a container 30 s after its stop signal.
+    environment = {row["name"]: row["value"] for row in BATCH["environment"]}
+    assert float(environment["PBRS_FARM_GRACE_S"]) < 30

@@ -1,4 +1,4 @@
-"""What the image copies is let through to the build, without Docker to ask."""
+"""Files that the image copies are in the build context, checked without Docker."""
 
 from __future__ import annotations
 

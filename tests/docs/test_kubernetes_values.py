@@ -1,4 +1,4 @@
-"""A site's values.yaml changes what it says: each value goes somewhere; as it stands it is the base."""
+"""Every value of a site's values.yaml is used; the unchanged file equals the base."""
 
 from __future__ import annotations
 
@@ -15,13 +15,13 @@ KUBERNETES = Path(__file__).parents[2] / "deploy/kubernetes"
 
 
 def values_of(site: Path) -> dict[str, Any]:
-    """What values.yaml sets, without its head."""
+    """The values of values.yaml without its head."""
     values = yaml.safe_load((site / "values.yaml").read_text())
     return {k: v for k, v in values.items() if k not in ("apiVersion", "kind", "metadata")}
 
 
 def leaves(value: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, ...], Any]]:
-    """(path, value) of everything in a mapping that is no mapping; `nodes` is one value."""
+    """(path, value) of every leaf of a mapping; `nodes` is one value."""
     if isinstance(value, dict) and path[-1:] != ("nodes",):
         for key, inner in value.items():
             yield from leaves(inner, (*path, key))
@@ -29,7 +29,7 @@ def leaves(value: Any, path: tuple[str, ...] = ()) -> Iterator[tuple[tuple[str, 
         yield path, value
 
 
-def test_each_value_is_taken_and_each_that_is_taken_is_there() -> None:
+def test_each_value_is_used_and_each_used_one_exists() -> None:
     component = yaml.safe_load((KUBERNETES / "values/kustomization.yaml").read_text())
     taken = [r["source"]["fieldPath"] for r in component["replacements"]]
     values = leaves(values_of(KUBERNETES / "overlays/site"))
@@ -37,7 +37,7 @@ def test_each_value_is_taken_and_each_that_is_taken_is_there() -> None:
 
 
 def rendered(folder: Path) -> dict[tuple[str, str], Any]:
-    """(kind, name) -> manifest of what kustomize makes of a folder."""
+    """(kind, name) -> manifest rendered by kustomize from a folder."""
     if shutil.which("kubectl") is None:
         pytest.skip("no kubectl")
     words = ["kubectl", "kustomize", str(folder)]
@@ -47,20 +47,20 @@ def rendered(folder: Path) -> dict[tuple[str, str], Any]:
 
 
 @pytest.mark.infra
-def test_the_values_as_they_stand_are_those_of_the_base() -> None:
-    base, own = (rendered(KUBERNETES / name) for name in ("base", "overlays/site"))
-    nodes = own["Deployment", "worker"]["spec"]["template"]["spec"].pop("nodeSelector")
+def test_the_default_values_equal_the_base() -> None:
+    base, site = (rendered(KUBERNETES / name) for name in ("base", "overlays/site"))
+    nodes = site["Deployment", "worker"]["spec"]["template"]["spec"].pop("nodeSelector")
     assert nodes == {"kubernetes.io/os": "linux"}
-    assert own == base
+    assert site == base
 
 
 @pytest.mark.infra
 def test_other_values_arrive_with_their_types(tmp_path: Path) -> None:
     shutil.copytree(KUBERNETES, tmp_path / "kubernetes")
     site = tmp_path / "kubernetes/overlays/site"
-    # With workers on GPUs, so that theirs are taken.
-    own = site / "kustomization.yaml"
-    own.write_text(own.read_text().replace("- ../../base", "- ../gpu"))
+    # With GPU workers, so that their values are used.
+    kustomization = site / "kustomization.yaml"
+    kustomization.write_text(kustomization.read_text().replace("- ../../base", "- ../gpu"))
     document = yaml.safe_load((site / "values.yaml").read_text())
     expected = []
     for number, (path, value) in enumerate(leaves(values_of(site))):
@@ -70,12 +70,12 @@ def test_other_values_arrive_with_their_types(tmp_path: Path) -> None:
         inner[path[-1]] = another(value, number)
         expected.append(inner[path[-1]])
     (site / "values.yaml").write_text(yaml.safe_dump(document))
-    found = list(everything(rendered(site)))
-    assert [value for value in expected if value not in found] == []
+    values = list(everything(rendered(site)))
+    assert [value for value in expected if value not in values] == []
 
 
 def another(value: Any, number: int) -> Any:
-    """A value that nothing else has, of the same type."""
+    """A unique value of the same type."""
     if isinstance(value, dict):
         return {**value, "pool": f"n{number}"}
     return 70_000 + number if isinstance(value, int) else f"n{number}-{value}"

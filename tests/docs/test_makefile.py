@@ -1,4 +1,4 @@
-"""Every target of the Makefile is commands that a shell can read, for every name that the pages give it."""
+"""Every target of the Makefile is valid shell, for every NAME in the pages."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ PAGES = [
 
 
 def commands_of(target: str, *variables: str) -> list[str]:
-    """What make would run, a command an entry; it runs nothing."""
+    """The commands that make would run, without running them."""
     done = subprocess.run(
         ["make", "-n", "--no-print-directory", target, *variables],
         cwd=REPO, capture_output=True, text=True, check=True,
@@ -30,7 +30,7 @@ def commands_of(target: str, *variables: str) -> list[str]:
 
 
 def named_in_pages() -> Iterator[tuple[str, str]]:
-    """(target, its NAME or "") of each `make ...` of the pages, in code alone."""
+    """(target, its NAME or "") of each `make ...` in the pages' code."""
     for page in PAGES:
         text = page.read_text(encoding="utf-8")
         for code in re.findall(r"^```.*?^```|`[^`\n]+`", text, re.MULTILINE | re.DOTALL):
@@ -52,7 +52,7 @@ def test_a_target_is_commands_that_a_shell_can_read(target: str, name: str) -> N
         assert done.returncode == 0, f"{command}\n{done.stderr}"
 
 
-def test_a_bench_installs_what_it_needs_and_nothing_else() -> None:
+def test_a_bench_installs_only_its_requirements() -> None:
     assert [c for c in commands_of("bench", "NAME=") if "pip" in c] == []
     for name, extra in (("docs", "docs"), ("release", "release"), ("light", "bench")):
         (install,) = [c for c in commands_of("bench", f"NAME={name}") if "pip install" in c]
@@ -68,22 +68,22 @@ def test_make_n_starts_nothing() -> None:
 
 
 def test_every_target_and_bench_that_a_page_names_exists() -> None:
-    found = {(t, n) for t, n in named_in_pages()}
-    assert len(found) > 30
-    assert {t for t, _n in found} - {*TARGETS} == set()
-    assert {n for t, n in found if t == "bench"} - {*BENCHES, ""} == set()
+    named = {(t, n) for t, n in named_in_pages()}
+    assert len(named) > 30
+    assert {t for t, _n in named} - {*TARGETS} == set()
+    assert {n for t, n in named if t == "bench"} - {*BENCHES, ""} == set()
 
 
 def test_clean_leaves_nothing_that_was_made_but_the_environment() -> None:
     (command,) = commands_of("clean")
     ignored = (REPO / ".gitignore").read_text(encoding="utf-8").split()
     folders = {name.strip("/") for name in ignored if name.endswith("/")}
-    kept = {"__pycache__", "*.egg-info", "homes"}
-    assert folders - kept <= {*command.split()}
+    exceptions = {"__pycache__", "*.egg-info", "homes"}
+    assert folders - exceptions <= {*command.split()}
 
 
 def test_docs_hears_the_warnings_at_which_strict_ends() -> None:
-    # --quiet drops warnings before --strict counts them: a dead link passes.
+    # --quiet drops warnings before --strict counts them: a dead link would pass.
     (line,) = re.findall(r"^\t.*mkdocs build.*", MAKEFILE, re.MULTILINE)
     assert "--strict" in line
     assert "--quiet" not in line

@@ -1,4 +1,4 @@
-"""The manual says what is: no history outside the lab book, fields that exist, how-to pages that parse."""
+"""The manual is current: no history outside the lab book, existing fields, how-to pages that parse."""
 
 from __future__ import annotations
 
@@ -45,12 +45,12 @@ def commands(page: Path) -> Iterator[list[str]]:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
-def test_every_fenced_block_says_how_its_commands_are_run(page: Path) -> None:
+def test_every_fenced_block_has_a_mark_for_its_commands(page: Path) -> None:
     assert [f"{b.name} {fault}" for b in blocks_of(page) for fault in b.faults()] == []
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
-def test_no_command_stands_in_a_block_by_indent_which_no_test_runs(page: Path) -> None:
+def test_no_command_is_in_an_indented_block_which_no_test_runs(page: Path) -> None:
     text = without_code(page.read_text(encoding="utf-8"))
     assert re.findall(r"^    (?:\S*/)?pbrs-farm .*", text, re.MULTILINE) == []
 
@@ -71,12 +71,12 @@ def test_a_link_leads_to_a_page_and_to_a_heading_of_it(page: Path) -> None:
 @cache
 def anchors(page: Path) -> list[str]:
     """The anchors that MkDocs gives a page's headings."""
-    found: list[str] = []
+    slugs: list[str] = []
     for heading in re.findall(r"^#+ (.+)$", without_code(page.read_text(encoding="utf-8")), re.M):
         words = re.sub(r"\]\([^)]*\)", "]", heading).encode("ascii", "ignore").decode()
         slug = re.sub(r"[-\s]+", "-", re.sub(r"[^\w\s-]", "", words).strip().lower())
-        found.append(f"{slug}_{found.count(slug)}" if slug in found else slug)
-    return found
+        slugs.append(f"{slug}_{slugs.count(slug)}" if slug in slugs else slug)
+    return slugs
 
 
 @pytest.mark.parametrize("page", manual_pages(REPO), ids=name_of)
@@ -92,7 +92,7 @@ def test_no_word_of_a_page_is_taken_for_html_and_so_not_shown(page: Path) -> Non
     ] == []
 
 
-def test_a_block_without_a_mark_or_with_a_wrong_one_is_told() -> None:
+def test_a_block_without_a_mark_or_with_a_wrong_one_is_reported() -> None:
     block = Block(REPO / "README.md", 1, "sh", "pbrs-farm homes  # nine\nls\n", "")
     assert block.lines == ["pbrs-farm homes", "ls"]
     assert block.faults() == ["has no mark: see tests/docs/fenced.py"]
@@ -112,16 +112,16 @@ def test_a_page_outside_the_lab_book_names_no_commit_and_no_date(page: Path) -> 
 
 
 @pytest.mark.parametrize("page", manual_pages(REPO), ids=name_of)
-def test_every_field_that_a_page_names_is_one_of_the_recipe(page: Path) -> None:
-    known = {*field_paths(), *(f"modes.{group}" for group in Recipe.model_fields)}
+def test_every_field_named_by_a_page_exists_in_the_recipe(page: Path) -> None:
+    paths = {*field_paths(), *(f"modes.{group}" for group in Recipe.model_fields)}
     groups = "|".join(set(Recipe.model_fields) - {"name", "seed"})
     text = page.read_text(encoding="utf-8")
     named = re.findall(rf"--set ((?:{groups})\.[a-z_0-9]+)=", text)
-    # Of a table of fields: the first cell of a row, `light.spp`, `light.noise`.
+    # In a table of fields: the first cell of a row, `light.spp`, `light.noise`.
     for cell in re.findall(r"^\| ((?:`[a-z_.0-9]+`(?:, )?)+) \|", text, re.MULTILINE):
         named += [f for f in re.findall(r"`([a-z_.0-9]+)`", cell) if re.match(rf"({groups})\.", f)]
     endings = (".exr", ".png", ".json", ".py", ".jsonl")
-    assert [f for f in named if f not in known and not f.endswith(endings)] == []
+    assert [f for f in named if f not in paths and not f.endswith(endings)] == []
 
 
 def test_every_page_that_the_code_names_exists() -> None:
@@ -136,7 +136,7 @@ def test_readme_has_at_most_110_lines() -> None:
 
 
 @pytest.mark.parametrize("page", PAGES, ids=name_of)
-def test_every_command_of_a_page_parses_and_its_recipe_is_one(
+def test_every_command_of_a_page_parses_and_its_recipe_is_valid(
     page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -148,21 +148,23 @@ def test_every_command_of_a_page_parses_and_its_recipe_is_one(
 
 
 @pytest.mark.parametrize("page", HOWTO, ids=name_of)
-def test_every_python_block_of_a_howto_compiles_and_calls_what_exists(page: Path) -> None:
+def test_every_python_block_of_a_howto_compiles_and_calls_existing_functions(page: Path) -> None:
     for block in fences(page, "python"):
         for node in ast.walk(ast.parse(block)):
             if isinstance(node, ast.Attribute):
                 owner = owner_of(node.value)
                 assert owner is None or hasattr(owner, node.attr), ast.unparse(node)
-            if isinstance(node, ast.Call) and (found := owner_of(node.func)) is not None:
-                known = inspect.signature(found).parameters
-                takes_any = any(p.kind is p.VAR_KEYWORD for p in known.values())
+            if isinstance(node, ast.Call) and (callee := owner_of(node.func)) is not None:
+                parameters = inspect.signature(callee).parameters
+                takes_any = any(p.kind is p.VAR_KEYWORD for p in parameters.values())
                 for keyword in node.keywords:
-                    assert takes_any or keyword.arg in known, f"{ast.unparse(node)}: {keyword.arg}"
+                    assert takes_any or keyword.arg in parameters, (
+                        f"{ast.unparse(node)}: {keyword.arg}"
+                    )
 
 
 def owner_of(node: ast.expr) -> Any:
-    """What an expression is, as far as it begins at pf or at a name of OF_NAME; else None."""
+    """The object of an expression that starts at pf or at a name of OF_NAME; else None."""
     match node:
         case ast.Name(id="pf"):
             return pbrs_farm
@@ -171,15 +173,15 @@ def owner_of(node: ast.expr) -> Any:
         case ast.Attribute(value=value, attr=attr):
             owner = owner_of(value)
             return None if owner is None else getattr(owner, attr)
-        case ast.Call(func=function) if (found := owner_of(function)) is not None:
-            # A method of a home that gives a home can be called on.
-            is_home = inspect.signature(found).return_annotation == "Home"
+        case ast.Call(func=function) if (callee := owner_of(function)) is not None:
+            # Calls on the result of a method that returns a home are checked, too.
+            is_home = inspect.signature(callee).return_annotation == "Home"
             return Home if is_home else None
     return None
 
 
 @pytest.mark.parametrize("page", HOWTO, ids=name_of)
-def test_a_howto_has_a_goal_a_command_or_python_what_one_gets_and_a_picture(page: Path) -> None:
+def test_a_howto_has_a_goal_a_command_or_python_a_result_and_a_picture(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
     assert text.startswith("# ")
     assert re.search(r"^You (want|have) ", text, re.MULTILINE)
@@ -202,6 +204,6 @@ def test_sentences_leave_code_tables_and_headings_out_and_links_keep_their_words
     assert [word_count(s) for s in sentences(text)] == [3, 3, 2, 2]
 
 
-def test_a_commit_is_told_from_a_number_a_house_and_a_word() -> None:
+def test_a_commit_is_distinguished_from_a_number_a_house_and_a_word() -> None:
     assert commits_named("at 8fc1fcd, (45ef339)") == ["8fc1fcd", "45ef339"]
     assert commits_named("26,421,021 of 779342 by 2bedroomapartment-b68e4452/views effaced") == []

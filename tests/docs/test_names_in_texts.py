@@ -1,4 +1,4 @@
-"""Files and modules that docstrings, comments and pages name are there."""
+"""Files and modules named in docstrings, comments and pages exist."""
 
 from __future__ import annotations
 
@@ -19,16 +19,17 @@ from tests.docs.fenced import blocks_of
 REPO = Path(__file__).parents[2]
 CODE = ("pbrs_farm", "workers", "tests", "benchmarks", "scripts", "examples")
 SOURCES = sorted(p for folder in CODE for p in (REPO / folder).rglob("*.py"))
-# The lab book and the changelog tell of what was; a tutorial may name a file that its reader writes.
+# The lab book and the changelog describe the past; a tutorial may name a file that its reader
+# writes.
 PAGES = [
     p
     for p in (*REPO.glob("*.md"), *(REPO / "docs").rglob("*.md"), *(REPO / "deploy").rglob("*.md"))
     if "lab" not in p.parts and p.name != "CHANGELOG.md"
 ]
-# Of a file: folders and a name with an ending that the repository has; of a module: a dotted name.
+# A file: folders and a name with an ending of the repository; a module: a dotted name.
 _FILE = re.compile(r"(?<![\w./*<>{}-])((?:[\w-]+/)*\w+\.(?:py|lua|sh))\b(?![.\w(=])")
 _MODULE = re.compile(r"(?<![\w./-])((?:pbrs_farm|workers|tests|benchmarks)(?:\.\w+)+)")
-# What a user writes, and the groups of entry points (core/plugins.py), which look like modules.
+# A user's files, and the groups of entry points (core/plugins.py), which look like modules.
 OTHERS = {"page.py", *(f"pbrs_farm.{kind}" for kind in GROUPS)}
 
 
@@ -48,24 +49,26 @@ def texts_of(source: Path) -> Iterator[str]:
 
 @cache
 def files() -> frozenset[str]:
-    """Every file of the repository, and every end of its path."""
+    """Every file of the repository, and every suffix of its path."""
     command = ["git", "ls-files", "-co", "--exclude-standard"]
     listed = subprocess.run(command, cwd=REPO, capture_output=True, text=True, check=True)
-    found = set()
+    ends = set()
     for line in listed.stdout.splitlines():
         if (REPO / line).exists():
             parts = line.split("/")
-            found |= {"/".join(parts[k:]) for k in range(len(parts))}
-    return frozenset(found)
+            ends |= {"/".join(parts[k:]) for k in range(len(parts))}
+    return frozenset(ends)
 
 
 def is_module(name: str) -> bool:
-    """Whether a dotted name is a package, a module, or a name that stands in one."""
+    """True if a dotted name is a package, a module, or a name in one."""
     parts = name.split(".")
     for k in range(len(parts), 0, -1):
-        at = REPO.joinpath(*parts[:k])
-        module = at.with_suffix(".py") if at.with_suffix(".py").exists() else at / "__init__.py"
-        if at.is_dir() and k == len(parts):
+        place = REPO.joinpath(*parts[:k])
+        module = (
+            place.with_suffix(".py") if place.with_suffix(".py").exists() else place / "__init__.py"
+        )
+        if place.is_dir() and k == len(parts):
             return True
         if module.exists():
             return k == len(parts) or re.search(rf"\b{parts[k]}\b", module.read_text()) is not None
@@ -73,13 +76,13 @@ def is_module(name: str) -> bool:
 
 
 def missing(text: str) -> list[str]:
-    """The files and modules that a text names and that are not there."""
+    """The files and modules that a text names and that do not exist."""
     named = [f for f in _FILE.findall(text) if f not in files() and f not in OTHERS]
     return named + [m for m in _MODULE.findall(text) if m not in OTHERS and not is_module(m)]
 
 
 def without_excerpts(page: Path) -> str:
-    """A page's text but for examples of code that a reader is to write."""
+    """A page's text without examples of code that a reader is to write."""
     text = page.read_text(encoding="utf-8")
     for block in blocks_of(page):
         if block.how() == "excerpt":
@@ -90,23 +93,23 @@ def without_excerpts(page: Path) -> str:
 
 @pytest.mark.parametrize("folder", CODE)
 def test_docstrings_and_comments_name_files_and_modules_that_exist(folder: str) -> None:
-    found = {
+    dead = {
         f"{source.relative_to(REPO)}: {name}"
         for source in SOURCES
         if source.relative_to(REPO).parts[0] == folder
         for text in texts_of(source)
         for name in missing(text)
     }
-    assert found == set()
+    assert dead == set()
 
 
 def test_pages_name_files_and_modules_that_exist() -> None:
-    found = {
+    dead = {
         f"{page.relative_to(REPO)}: {name}"
         for page in PAGES
         for name in missing(without_excerpts(page))
     }
-    assert found == set()
+    assert dead == set()
 
 
 def test_a_name_that_is_gone_is_found() -> None:

@@ -17,18 +17,18 @@ PIP = '%pip install -q "pbrs-farm[llvm]"'
 
 
 def cells(notebook: Path) -> list[dict[str, Any]]:
-    found: list[dict[str, Any]] = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
-    return found
+    cell_list: list[dict[str, Any]] = json.loads(notebook.read_text(encoding="utf-8"))["cells"]
+    return cell_list
 
 
 @pytest.mark.parametrize("notebook", NOTEBOOKS, ids=lambda path: path.stem)
 def test_a_notebook_is_small_explains_itself_and_holds_no_output(notebook: Path) -> None:
-    found = cells(notebook)
-    assert 8 <= len(found) <= 16
-    assert sum(cell["cell_type"] == "markdown" for cell in found) >= 4
-    assert "".join(found[0]["source"]).startswith("# ")
-    assert "".join(found[1]["source"]) == PIP
-    for cell in found:
+    cell_list = cells(notebook)
+    assert 8 <= len(cell_list) <= 16
+    assert sum(cell["cell_type"] == "markdown" for cell in cell_list) >= 4
+    assert "".join(cell_list[0]["source"]).startswith("# ")
+    assert "".join(cell_list[1]["source"]) == PIP
+    for cell in cell_list:
         assert not cell.get("outputs")
         assert cell.get("execution_count") is None
 
@@ -57,8 +57,8 @@ def test_a_notebook_runs_to_its_end(
     book = nbformat.read(notebook, as_version=4)
     # This environment has the package already.
     book.cells = [cell for cell in book.cells if cell.source != PIP]
-    here = {"metadata": {"path": str(tmp_path)}}
-    NotebookClient(book, timeout=170, kernel_name="python3", resources=here).execute()
+    resources = {"metadata": {"path": str(tmp_path)}}
+    NotebookClient(book, timeout=170, kernel_name="python3", resources=resources).execute()
     outputs = [output for cell in book.cells for output in cell.get("outputs", ())]
     assert not [o for o in outputs if o.get("name") == "stderr"]
     shown = [o["data"] for o in outputs if "data" in o]
@@ -66,7 +66,7 @@ def test_a_notebook_runs_to_its_end(
 
 
 @pytest.mark.notebooks
-def test_the_notebooks_run_by_pip_alone_without_root_llvm_or_opengl(tmp_path: Path) -> None:
+def test_the_notebooks_run_after_pip_without_root_llvm_or_opengl(tmp_path: Path) -> None:
     if not can_be_made():
         pytest.skip("hiding the system's libraries needs unshare, and root or user namespaces")
     bare = BareMachine(tmp_path)
@@ -74,7 +74,7 @@ def test_the_notebooks_run_by_pip_alone_without_root_llvm_or_opengl(tmp_path: Pa
     python = bare.environment("env")
     bare.run([python, "-m", "pip", "install", "-q", "nbclient", "ipykernel"]).check_returncode()
     for notebook in NOTEBOOKS:
-        # The first one's own cell installs the package.
+        # The first notebook's first cell installs the package.
         shown = bare.notebook(python, notebook, variables)
         assert not [line for line in shown if line.startswith("error")], notebook.stem
         assert {"image/png", "text/html"} & set(shown), notebook.stem

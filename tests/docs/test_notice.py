@@ -1,4 +1,4 @@
-"""NOTICE, the page of licences, the changelog and the citation name what is there."""
+"""NOTICE, the page of licences, the changelog and the citation name existing files."""
 
 from __future__ import annotations
 
@@ -35,12 +35,7 @@ def test_the_citation_has_the_version_of_the_changelogs_newest_heading() -> None
     citation = yaml.safe_load((ROOT / "CITATION.cff").read_text(encoding="utf-8"))
     assert heading is not None
     assert str(citation["version"]) == heading[1]
-    assert {
-        "cff-version",
-        "message",
-        "title",
-        "authors",
-    } <= citation.keys()  # what CFF 1.2 asks for
+    assert {"cff-version", "message", "title", "authors"} <= citation.keys()  # required by CFF 1.2
 
 
 def test_notice_credits_wordnet() -> None:

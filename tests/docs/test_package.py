@@ -1,4 +1,4 @@
-"""What is built from this tree: the text for an index, the installed names, archives of equal bytes."""
+"""Distributions built from this tree: the index text, the installed names, archives of equal bytes."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ REPO = Path(__file__).parents[2]
 
 @pytest.fixture(scope="module")
 def build_script() -> ModuleType:
-    """setup.py as a module: it builds nothing unless it is run."""
+    """setup.py as a module: it builds only as a script."""
     spec = importlib.util.spec_from_file_location("build_script", REPO / "setup.py")
     assert spec is not None
     assert spec.loader is not None
@@ -53,7 +53,7 @@ def test_two_builds_of_a_tree_are_the_same_bytes_and_an_index_takes_them(tmp_pat
     pytest.importorskip("build")
     pytest.importorskip("twine")
     for k, mask in enumerate((0o022, 0o077)):
-        # Another folder, other times of files, another mask: none of them may show.
+        # Another folder, other file times, another umask: none of them may matter.
         tree, out = tmp_path / f"tree{k}", tmp_path / f"dist{k}"
         subprocess.run(["git", "clone", "-q", str(REPO), str(tree)], check=True, umask=mask)
         words = [sys.executable, "-m", "build", "--no-isolation", "--outdir", str(out), str(tree)]

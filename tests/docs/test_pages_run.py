@@ -1,8 +1,8 @@
-"""Every page does what it says: its commands and its Python, run in order as their marks say.
+"""Every page works: its commands and its Python run in order, as their marks say.
 
-What a page shows large is made small where its mark says so: two homes for twenty, a view for four, 64 pixels for
-640. What needs a farm, a browser or Docker is left to the tests of those (fenced.NEEDS); everything else runs to its
-end. The pages whose blocks are marked `run` alone are run as they stand by test_tutorials.py.
+Large examples are reduced if their mark says so: two homes for twenty, a view for four, 64 pixels for
+640. Commands that need a farm, a browser or Docker are run by other tests (fenced.NEEDS); everything else
+runs to its end. Pages whose blocks are all marked `run` are run unchanged by test_tutorials.py.
 """
 
 from __future__ import annotations
@@ -31,7 +31,7 @@ from tests.scene.homes import SMALL
 pytestmark = pytest.mark.pages
 
 AS_THEY_STAND = ("researcher", "python")  # test_tutorials.py runs these
-ONE_SESSION = ("data",)  # a block of Python takes names of those before it
+ONE_SESSION = ("data",)  # a block of Python uses names of earlier ones
 WITH_RECIPE = ("run", "scatter", "dress", "cameras", "repair")
 WITH_HERE = ("run", "small", *(["needs study"] if find_spec("torch") else []))
 SHRUNK = (
@@ -48,7 +48,7 @@ SHRUNK_PYTHON = (
 SHRUNK_FILE = (  # of a data set
     (r"made:1\.\.50", "made:1..2"), (r"views = 12", "views = 1"), (r'recipe = "fast"', 'recipe = "small.toml"'), (r'size = "1024x512"', 'size = "128x64"'),
 )  # fmt: skip
-NEEDS = {  # what a page takes from a page before it
+NEEDS = {  # files that a page takes from an earlier page
     "data": ("run Studio --recipe preview --views 2 --out out/studio",),
     "study": ("run made:1..20 --recipe preview --modes mlt_il_ol --out out/homes",),
 }
@@ -79,8 +79,8 @@ def test_a_page_runs_to_its_end(page: Path, tmp_path: Path) -> None:
         for line in block.lines if block.language == "sh" else ():
             if block.how(line) not in WITH_HERE:
                 continue
-            if given := re.fullmatch(r"(\w+)=(\S+)", line):
-                variables[given[1]] = given[2]
+            if match := re.fullmatch(r"(\w+)=(\S+)", line):
+                variables[match[1]] = match[2]
                 continue
             for name, value in variables.items():
                 line = line.replace(f"${name}", value)
@@ -105,25 +105,25 @@ def _command(line: str, folder: Path, *, small: bool) -> None:
         if words[1] == "train" and "--set" not in words:
             words += ["--set", "steps=2"]
         words = [sys.executable, "-m", "pbrs_farm.cli", *words[1:]]
-    made = subprocess.run(
+    done = subprocess.run(
         words, cwd=folder, env=_environment(folder), capture_output=True, text=True, timeout=900
     )
-    assert made.returncode == 0, f"{line}\n{made.stdout[-2000:]}\n{made.stderr[-3000:]}"
+    assert done.returncode == 0, f"{line}\n{done.stdout[-2000:]}\n{done.stderr[-3000:]}"
     if "--out" in words:
         out = folder / words[words.index("--out") + 1]
         assert out.is_file() or any(out.iterdir()), f"{line}: nothing in {out}"
 
 
 def _placed(word: str, folder: Path) -> str:
-    """What a page's placeholder stands for: HOME and N of the gallery, the first view for HOUSE/views/VIEW."""
+    """Replacement of a page's placeholder: HOME and N of the gallery, the first view for HOUSE/views/VIEW."""
     if word == "HOME":
         return "Studio"
     if word == "docs/pictures/gallery/N.json":
-        return str(REPO / "docs/pictures/gallery/04.json")  # of Studio, as the gallery says
-    if "*" in word:  # as a shell would
+        return str(REPO / "docs/pictures/gallery/04.json")  # Studio, as in the gallery
+    if "*" in word:  # expanded as by a shell
         return str(next(folder.glob(word)).relative_to(folder))
-    root, found, _ = word.partition("/houses/HOUSE/views/VIEW")
-    if not found:
+    root, placeholder, _ = word.partition("/houses/HOUSE/views/VIEW")
+    if not placeholder:
         return word
     view = next((folder / root).glob("houses/*/views/*"))
     return str(view.relative_to(folder))
@@ -136,10 +136,10 @@ def _python(block: str, folder: Path) -> None:
     # A spawned process reads the script again.
     (folder / "page.py").write_text(f"if __name__ == '__main__':\n{_indented(block)}")
     words = [sys.executable, "page.py"]
-    made = subprocess.run(
+    done = subprocess.run(
         words, cwd=folder, env=_environment(folder), capture_output=True, text=True, timeout=900
     )
-    assert made.returncode == 0, f"{block}\n{made.stderr[-3000:]}"
+    assert done.returncode == 0, f"{block}\n{done.stderr[-3000:]}"
 
 
 def _indented(block: str) -> str:
@@ -147,7 +147,7 @@ def _indented(block: str) -> str:
 
 
 def _environment(folder: Path) -> dict[str, str]:
-    """A shell's: this tree's packages, what a page installed, and pbrs-farm as a command."""
+    """The environment of a shell: this tree's packages, those that a page installed, and pbrs-farm as a command."""
     command = folder / "bin/pbrs-farm"
     if not command.exists():
         command.parent.mkdir()
@@ -161,7 +161,7 @@ def _environment(folder: Path) -> dict[str, str]:
 
 
 def _provide(folder: Path, text: str) -> None:
-    """Beside a page: a small recipe, the files that it shows, and models and photographs of a user."""
+    """Provide for a page: a small recipe, the files that it shows, and a user's models and photographs."""
     small = recipe_from_name("preview", {name: str(value) for name, value in SMALL.items()})
     (folder / "small.toml").write_text(toml_from_recipe(small))
     # A block under a sentence that names a file is that file.

@@ -1,6 +1,6 @@
-"""A picture of the pages shows the views that its command makes now: docs/pictures/views.csv has picture, command, views.
+"""A picture of the pages shows the current views of its command: docs/pictures/views.csv has picture, command, views.
 
-Who makes a picture anew writes its row; captions inside the pictures name the same views.
+Whoever renders a picture again updates its row; captions inside the pictures name the same views.
 """
 
 from __future__ import annotations
@@ -22,7 +22,7 @@ from tests.docs.fenced import PAGES, REPO
 PICTURES = REPO / "docs/pictures"
 with (PICTURES / "views.csv").open(encoding="utf-8") as _file:
     ROWS = list(csv.DictReader(_file))
-_MAKE = {"make demo": "pbrs-farm demo"}  # what the target runs
+_MAKE = {"make demo": "pbrs-farm demo"}  # commands of the targets
 
 
 def name_of(row: dict[str, str]) -> str:
@@ -30,7 +30,7 @@ def name_of(row: dict[str, str]) -> str:
 
 
 @pytest.mark.parametrize("row", ROWS, ids=name_of)
-def test_a_picture_of_the_table_stands_in_a_page(row: dict[str, str]) -> None:
+def test_a_picture_of_the_table_is_on_a_page(row: dict[str, str]) -> None:
     assert (PICTURES / row["picture"]).is_file()
     pages = [page.read_text(encoding="utf-8") for page in PAGES]
     assert any(f"pictures/{row['picture']})" in text for text in pages)
@@ -39,7 +39,7 @@ def test_a_picture_of_the_table_stands_in_a_page(row: dict[str, str]) -> None:
 
 def test_every_picture_with_a_command_that_chooses_views_has_a_row() -> None:
     text = (REPO / "docs/gallery.md").read_text(encoding="utf-8")
-    known = {(row["picture"], row["command"]) for row in ROWS}
+    pairs = {(row["picture"], row["command"]) for row in ROWS}
     shown = []
     for above, below in zip(text.splitlines(), text.splitlines()[1:], strict=False):
         if above.startswith("![") and below.startswith(("`make demo", "`pbrs-farm dress")):
@@ -47,7 +47,7 @@ def test_every_picture_with_a_command_that_chooses_views_has_a_row() -> None:
             command = below.strip("`").split(" --out ")[0]
             shown.append((picture, command))
     assert len(shown) >= 4
-    assert set(shown) <= known
+    assert set(shown) <= pairs
 
 
 def test_each_home_of_the_gallery_is_shown_by_its_number_and_has_a_camera() -> None:
@@ -64,8 +64,8 @@ def test_each_home_of_the_gallery_is_shown_by_its_number_and_has_a_camera() -> N
 
 
 @pytest.mark.pages
-def test_the_gallery_shows_homes_as_they_are_made_now() -> None:
-    """Its cameras stand in other rooms otherwise: scripts/gallery_pictures.py makes it anew."""
+def test_the_gallery_shows_the_current_homes() -> None:
+    """Otherwise its cameras are in other rooms: scripts/gallery_pictures.py renders it again."""
     text = (REPO / "docs/gallery.md").read_text(encoding="utf-8")
     now = versions_of_passes()
     assert (
@@ -80,7 +80,7 @@ def test_a_command_makes_the_views_that_its_picture_shows(row: dict[str, str]) -
 
 
 def views_of(command: str) -> list[str]:
-    """The ids of the views that demo or dress would make, without rendering them."""
+    """The ids of the views of demo or dress, without rendering them."""
     from pbrs_farm.core.house import geometry_from_house
     from pbrs_farm.prepare.finished_house import finished_house
     from pbrs_farm.prepare.source import resolve, variants

@@ -1,4 +1,4 @@
-"""What is stable is said in one place, and examples, plugins and pages need nothing else."""
+"""The stable names are listed once, and examples, plugins and pages use no others."""
 
 from __future__ import annotations
 
@@ -19,13 +19,13 @@ LOADERS = "pbrs_farm.study."  # docs/data.md and a notebook name torch's loaders
 
 def imported(text: str) -> set[str]:
     """Modules of ours that Python imports."""
-    found = set()
+    modules = set()
     for node in ast.walk(ast.parse(text)):
         if isinstance(node, ast.ImportFrom) and node.module:
-            found.add(node.module)
+            modules.add(node.module)
         elif isinstance(node, ast.Import):
-            found |= {alias.name for alias in node.names}
-    ours = {name for name in found if name.partition(".")[0] in ("pbrs_farm", "workers")}
+            modules |= {alias.name for alias in node.names}
+    ours = {name for name in modules if name.partition(".")[0] in ("pbrs_farm", "workers")}
     return {name for name in ours if not name.startswith(LOADERS)}
 
 
@@ -49,11 +49,11 @@ SCRIPTS = [
 
 
 @pytest.mark.parametrize("path", SCRIPTS, ids=lambda path: str(path.relative_to(REPO)))
-def test_what_users_copy_imports_stable_names_alone(path: Path) -> None:
+def test_examples_import_only_stable_names(path: Path) -> None:
     assert imported(code_of(path)) <= {*STABLE}
 
 
-def test_every_stable_name_is_there_and_the_pages_of_the_api_have_them_all() -> None:
+def test_every_stable_name_exists_and_is_in_the_api_pages() -> None:
     for module in (pf, plugin):
         assert all(getattr(module, name) is not None for name in module.__all__)
     page = "".join(p.read_text(encoding="utf-8") for p in (REPO / "docs/api").glob("*.md"))

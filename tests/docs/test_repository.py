@@ -1,4 +1,4 @@
-"""What a hosting site and a contributor's machine read: workflow, issue forms, hooks name what exists."""
+"""Files for a hosting site and a contributor's machine: workflow, issue forms and hooks name existing targets."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ def loaded(path: Path) -> Any:
     return yaml.safe_load(path.read_text(encoding="utf-8"))
 
 
-def test_ci_runs_the_one_script_on_every_python_that_the_project_takes() -> None:
+def test_ci_runs_one_script_on_every_supported_python() -> None:
     job = loaded(REPO / ".github/workflows/ci.yml")["jobs"]["test"]
     project = tomllib.loads((REPO / "pyproject.toml").read_text(encoding="utf-8"))["project"]
     pythons = [c.rpartition(" ")[2] for c in project["classifiers"] if ":: Python :: 3." in c]
@@ -28,7 +28,7 @@ def test_ci_runs_the_one_script_on_every_python_that_the_project_takes() -> None
     assert (REPO / ".ci/run").exists()
 
 
-def test_ci_tries_a_view_and_its_resumption_on_the_systems_that_no_one_here_has() -> None:
+def test_ci_tries_a_view_and_its_resumption_on_other_systems() -> None:
     job = loaded(REPO / ".github/workflows/ci.yml")["jobs"]["systems"]
     assert [system.partition("-")[0] for system in job["strategy"]["matrix"]["system"]] == [
         "macos", "windows",
@@ -40,9 +40,9 @@ def test_ci_tries_a_view_and_its_resumption_on_the_systems_that_no_one_here_has(
 
 @pytest.mark.parametrize("path", WORKFLOWS, ids=lambda p: p.stem)
 def test_a_workflow_makes_targets_that_there_are(path: Path) -> None:
-    made = re.findall(r"run: make ([a-z-]+)", path.read_text(encoding="utf-8"))
+    targets = re.findall(r"run: make ([a-z-]+)", path.read_text(encoding="utf-8"))
     makefile = (REPO / "Makefile").read_text(encoding="utf-8")
-    for target in made:
+    for target in targets:
         assert re.search(rf"^{target}:", makefile, re.MULTILINE), target
 
 
@@ -53,7 +53,7 @@ def test_a_workflow_names_actions_by_the_digest_of_a_commit(path: Path) -> None:
 
 
 @pytest.mark.parametrize("path", [f for f in FORMS if f.stem != "config"], ids=lambda p: p.stem)
-def test_an_issue_form_has_what_the_site_asks_for(path: Path) -> None:
+def test_an_issue_form_has_the_fields_that_the_site_requires(path: Path) -> None:
     form = loaded(path)
     assert {"name", "description", "body"} <= form.keys()
     names = [field["id"] for field in form["body"]]
@@ -61,7 +61,7 @@ def test_an_issue_form_has_what_the_site_asks_for(path: Path) -> None:
     assert all(field["attributes"]["label"] for field in form["body"])
 
 
-def test_hooks_run_what_make_check_runs() -> None:
+def test_hooks_run_the_commands_of_make_check() -> None:
     (repo,) = loaded(REPO / ".pre-commit-config.yaml")["repos"]
     hooks = " ".join(hook["entry"] for hook in repo["hooks"])
     check = (REPO / "Makefile").read_text(encoding="utf-8").partition("\ncheck:")[2]
@@ -69,7 +69,7 @@ def test_hooks_run_what_make_check_runs() -> None:
         assert f".venv/bin/{program}" in hooks, program
 
 
-def test_no_modules_import_one_another_at_run_time() -> None:
+def test_no_modules_import_each_other_at_run_time() -> None:
     from benchmarks.house import import_cycles, imports_of_modules
 
     assert import_cycles(imports_of_modules()) == 0

@@ -1,4 +1,4 @@
-"""The operator's and the packager's tutorials are true: services start, a job ends, the wheel works."""
+"""The operator's and the packager's tutorials work: services start, a job ends, the wheel installs."""
 
 from __future__ import annotations
 
@@ -21,13 +21,13 @@ from tests.workers.redis_server import free_port
 
 def lines_of(page: str) -> list[list[str]]:
     """The words of each line of each sh block."""
-    found = [text for language, text in blocks(page) if language == "sh"]
-    return [shlex.split(line) for text in found for line in text.splitlines()]
+    texts = [text for language, text in blocks(page) if language == "sh"]
+    return [shlex.split(line) for text in texts for line in text.splitlines()]
 
 
 @pytest.fixture
 def services(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """The services of the operator's first block, on a Redis and a store of this test's own."""
+    """The services of the operator's first block, on a private Redis and store."""
     port = free_port()
     monkeypatch.setenv("PBRS_REDIS_URL", f"redis://127.0.0.1:{port}/0")
     monkeypatch.setenv("PBRS_STORE", (tmp_path / "store").as_uri())
@@ -39,8 +39,8 @@ def services(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
         for words in lines_of("tutorials/operator.md")
         if words[0] == "redis-server" or words[-1] in ("coordinator", "worker")
     )
-    own = ["--port", str(port), "--bind", "127.0.0.1", "--dir", str(tmp_path)]
-    commands = [[*redis, *own]]
+    options = ["--port", str(port), "--bind", "127.0.0.1", "--dir", str(tmp_path)]
+    commands = [[*redis, *options]]
     commands += [[sys.executable, "-m", "pbrs_farm.cli", *w[1:]] for w in (coordinator, worker)]
     processes = []
     try:
@@ -66,7 +66,7 @@ def wait_for_redis(port: int) -> None:
 
 
 @pytest.mark.pages
-def test_the_operators_job_runs_to_its_end_and_what_the_table_says_works(
+def test_the_operators_job_runs_to_its_end_and_the_table_is_right(
     services: None, capsys: pytest.CaptureFixture[str]
 ) -> None:
     n_run = 0
@@ -76,10 +76,10 @@ def test_the_operators_job_runs_to_its_end_and_what_the_table_says_works(
         assert main(words) == 0, words
         n_run += 1
     assert n_run >= 3
-    said = capsys.readouterr().out
-    job = said.split()[0]
-    assert re.search(rf"job {job}  done ", said)
-    assert re.search(r"w1\s+alive", said)
+    output = capsys.readouterr().out
+    job = output.split()[0]
+    assert re.search(rf"job {job}  done ", output)
+    assert re.search(r"w1\s+alive", output)
     for words in (
         ["failures"],
         ["retry"],
@@ -93,8 +93,8 @@ def test_the_operators_job_runs_to_its_end_and_what_the_table_says_works(
 @pytest.mark.parametrize("page", ["operator", "packager", "researcher"])
 def test_a_tutorial_names_only_verbs_that_exist(page: str) -> None:
     text = (REPO / f"docs/tutorials/{page}.md").read_text(encoding="utf-8")
-    known = {verb for verbs in MODULES.values() for verb in verbs}
-    assert set(re.findall(r"`pbrs-farm ([a-z][a-z-]*)", text)) <= known
+    verbs_known = {verb for verbs in MODULES.values() for verb in verbs}
+    assert set(re.findall(r"`pbrs-farm ([a-z][a-z-]*)", text)) <= verbs_known
 
 
 @pytest.mark.pages
@@ -105,7 +105,7 @@ def test_the_packagers_wheel_is_built_installed_and_runs(tmp_path: Path) -> None
     for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE", "NOTICE"):
         shutil.copy(REPO / name, source)
     build, install, *_rest = [w for w in lines_of("tutorials/packager.md") if w[0] == "pip"]
-    # Without a network: with the setuptools that is here, and no dependency.
+    # Without a network: with the installed setuptools, and no dependency.
     alone = ["--no-build-isolation", "--no-index", "--quiet", "--disable-pip-version-check"]
     pip = [sys.executable, "-m", "pip"]
     subprocess.run([*pip, *build[1:], *alone], cwd=source, check=True)
@@ -120,10 +120,10 @@ def test_the_packagers_wheel_is_built_installed_and_runs(tmp_path: Path) -> None
     words = ["install", shown.stdout.strip(), "--no-deps", "--target", str(site), *alone[1:]]
     subprocess.run([*pip, *words], cwd=source, check=True)
     env = {**os.environ, "PYTHONPATH": str(site), "PBRS_REDIS_URL": "redis://127.0.0.1:1/0"}
-    told = run(
+    output = run(
         ["-c", "import pbrs_farm, pbrs_farm_workers.job as j; print(j.__file__)"], tmp_path, env
     )
-    assert told.stdout.startswith(str(site))
+    assert output.stdout.startswith(str(site))
     assert (site / "pbrs_farm/py.typed").is_file()
     assert not (site / "workers").exists()
     assert "_pbrs" in run(["-m", "pbrs_farm.cli", "completion", "bash"], tmp_path, env).stdout

@@ -1,4 +1,4 @@
-"""What the tutorials and pages show is true: commands run, Python runs, files are there."""
+"""The tutorials and pages work: commands and Python run, files exist."""
 
 from __future__ import annotations
 
@@ -41,10 +41,10 @@ def test_every_block_of_the_python_page_runs(
 ) -> None:
     monkeypatch.chdir(tmp_path)
     names: dict[str, object] = {}
-    found = [text for language, text in blocks("python.md") if language == "python"]
-    for text in found:
+    sources = [text for language, text in blocks("python.md") if language == "python"]
+    for text in sources:
         exec(compile(text, "python.md", "exec"), names)
-    assert len(found) >= 6
+    assert len(sources) >= 6
     assert names["pose"]
     assert len(names["frames"]) == 2  # type: ignore[arg-type]
 
@@ -52,10 +52,10 @@ def test_every_block_of_the_python_page_runs(
 @pytest.mark.parametrize("page", PAGES, ids=lambda page: page.stem)
 def test_a_page_shows_verbs_that_exist_and_no_folder_a_clone_lacks(page: Path) -> None:
     text = page.read_text(encoding="utf-8")
-    known = {verb for verbs in MODULES.values() for verb in verbs}
+    verbs_known = {verb for verbs in MODULES.values() for verb in verbs}
     for fence in re.findall(r"^```[a-z]*\n(.*?)^```", text, re.MULTILINE | re.DOTALL):
         for verb in re.findall(r"^(?:\.venv/bin/)?pbrs-farm ([a-z][a-z-]*)", fence, re.MULTILINE):
-            assert verb in known, verb
+            assert verb in verbs_known, verb
     assert "../shared" not in text
     for link in re.findall(r"\]\(([^)#:]+)\)", text):
         assert (page.parent / link).exists(), link
@@ -74,13 +74,13 @@ def test_the_packagers_table_names_the_extras_that_there_are() -> None:
         "dev",
         "release",
     }
-    for extra, said in rows.items():
+    for extra, cell in rows.items():
         if extra != "all":
             packages = [re.split(r"[\[>=]", words)[0] for words in extras[extra]]
-            assert set(said.split(", ")) <= {p.removesuffix("-cpu") for p in packages}
+            assert set(cell.split(", ")) <= {p.removesuffix("-cpu") for p in packages}
 
 
-def test_every_page_stands_in_the_sites_navigation() -> None:
+def test_every_page_is_in_the_sites_navigation() -> None:
     nav = (REPO / "mkdocs.yml").read_text(encoding="utf-8")
     for page in PAGES:
         assert f": {page.relative_to(REPO / 'docs')}" in nav, page

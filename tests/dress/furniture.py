@@ -1,4 +1,4 @@
-"""Rooms and raw furniture for tests of the dressing, built in code."""
+"""Rooms and raw furniture built in code, for tests of the dressing."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def boards(item_id: str, boxes: list[tuple[list[float], list[float]]], nyu40: in
 
 
 def bookcase(item_id: str = "bookcase", n_shelves: int = 4) -> Item:
-    """1 m wide, 0.3 m deep, 2 m high, its back at the wall z = 0, open to +z; boards of 2 cm."""
+    """A bookcase 1 m wide, 0.3 m deep, 2 m high, its back at the wall z = 0, open to +z; boards of 2 cm."""
     x0, x1, z0, z1 = 1.0, 2.0, 0.0, 0.3
     parts = [
         ([x0, 0.0, z0], [x0 + 0.02, 2.0, z1]),
@@ -44,7 +44,7 @@ def bookcase(item_id: str = "bookcase", n_shelves: int = 4) -> Item:
 
 
 def thin_table(item_id: str = "table") -> Item:
-    """A top without thickness that faces downwards, 0.75 m high, 1.2 x 0.8 m."""
+    """A table top of zero thickness that faces downwards, 0.75 m high, 1.2 x 0.8 m."""
     low, high = [1.0, 0.75, 1.0], [2.2, 0.75, 1.8]
     corners = np.array([low, [high[0], 0.75, low[2]], high, [low[0], 0.75, high[2]]])
     surface: Surface = quads_surface("top", corners[None], 0)
@@ -52,7 +52,7 @@ def thin_table(item_id: str = "table") -> Item:
 
 
 def house(*items: Item, name: str = "Living room") -> House:
-    """A house of one room without walls that holds these items."""
+    """A house of one room without walls that contains these items."""
     return House(
         "test-00000000", "test", Source("builtin", "", ""), (Level("0", "0", 0.0, HEIGHT),),
         (room(name),), items, (Material("white"),), {},

@@ -24,7 +24,7 @@ def _uv_areas(surface: Surface) -> F64:
     return np.abs(u[:, 0] * v[:, 1] - u[:, 1] * v[:, 0]) / 2
 
 
-def test_a_picture_is_as_large_on_every_side_as_it_is() -> None:
+def test_a_picture_has_the_same_scale_on_every_side() -> None:
     surface = _board([1.0, 0.2, 0.4])
     mapped = box_mapped(surface, np.eye(3), (0.5, 0.25))
     areas = face_areas(triangle_corners(mapped.positions, mapped.faces))
@@ -53,13 +53,13 @@ def test_the_grain_runs_along_the_longest_side_of_a_turned_board() -> None:
 
 
 def test_two_boards_show_different_places_of_the_picture() -> None:
-    one = _board([1.0, 0.1, 0.1])
-    two = replace(one, positions=one.positions + np.float32([0, 1, 0]))
-    both = replace(
-        one, positions=np.concatenate([one.positions, two.positions]),
-        faces=np.concatenate([one.faces, two.faces + len(one.positions)]),
+    board = _board([1.0, 0.1, 0.1])
+    two = replace(board, positions=board.positions + np.float32([0, 1, 0]))
+    boards = replace(
+        board, positions=np.concatenate([board.positions, two.positions]),
+        faces=np.concatenate([board.faces, two.faces + len(board.positions)]),
     )  # fmt: skip
-    mapped = box_mapped(replace(both, uvs=None), np.eye(3), (1.0, 1.0))
+    mapped = box_mapped(replace(boards, uvs=None), np.eye(3), (1.0, 1.0))
     assert mapped.uvs is not None
     is_low = mapped.positions[:, 1] < 0.5
     low, high = (np.sort(mapped.uvs[m][:, 0] % 1.0) for m in (is_low, ~is_low))

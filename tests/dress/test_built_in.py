@@ -1,4 +1,4 @@
-"""One scheme of finishes a home: doors, windows, stairs and what is fitted have them."""
+"""One scheme of finishes per home for doors, windows, stairs and fittings."""
 
 from dataclasses import replace
 
@@ -25,17 +25,17 @@ FRAME = [
 
 
 def door() -> Item:
-    """A door whose frame, leaf and handle are one surface of one colour."""
+    """A door with frame, leaf and handle in one surface of one colour."""
     item = boards("door", FRAME, 8)
     starts = np.cumsum([0, *(len(s.positions) for s in item.surfaces)])
-    one = replace(
+    whole = replace(
         item.surfaces[0],
         positions=np.concatenate([s.positions for s in item.surfaces]),
         faces=np.concatenate([s.faces + n for s, n in zip(item.surfaces, starts, strict=False)]),
         uvs=None,
         normals=None,
     )
-    return replace(item, name="Door", kind=ItemKind.DOOR, surfaces=(one,))
+    return replace(item, name="Door", kind=ItemKind.DOOR, surfaces=(whole,))
 
 
 def joined(source: House, seed: int, share: float = 1.0) -> House:
@@ -55,11 +55,11 @@ def test_a_door_is_parted_into_frame_leaf_and_handle_and_keeps_its_mesh() -> Non
         assert has_same_mesh(home.items[0], door())
         counts.add(len(home.items[0].surfaces))
         assert any(m.specular[0] > 0.1 for m in materials_of(home))
-    # Some homes have a leaf like its frame, others another one.
+    # In some homes the leaf matches its frame, in others it does not.
     assert counts == {2, 3}
 
 
-def test_one_home_has_one_scheme_and_seeds_have_several() -> None:
+def test_one_home_has_one_scheme_and_seeds_give_several() -> None:
     two = house(door(), replace(door(), id="another"))
     looks = set()
     for seed in range(1, 7):
@@ -88,26 +88,26 @@ def test_panes_and_pictures_of_a_door_stay(material: Material) -> None:
     ("name", "is_coated"),
     [("Woven basket", False), ("Home theater", False), ("Oven", True), ("panelHeater", True)],
 )
-def test_a_thing_is_coated_by_whole_words_of_its_name(name: str, is_coated: bool) -> None:
+def test_whole_words_of_a_name_select_the_coat(name: str, is_coated: bool) -> None:
     thing = replace(solid("thing", [0.0, 0.0, 0.0], [0.6, 0.8, 0.6], OTHERFURNITURE), name=name)
     home = joined(house(thing), 1)
     assert ("changed:joinery" in home.items[0].tags) is is_coated
 
 
 @pytest.mark.parametrize("name", ["Radiator", "Oven"])
-def test_a_thing_that_no_coat_covers_counts_as_unchanged(name: str) -> None:
+def test_an_item_without_a_coat_counts_as_unchanged(name: str) -> None:
     thing = replace(solid("thing", [0.0, 0.0, 0.0], [0.6, 0.8, 0.6], OTHERFURNITURE), name=name)
     source = replace(house(thing), materials=(Material("print", texture_id="0123456789abcdef"),))
     assert joined(source, 1).items[0].tags == thing.tags
 
 
-def test_the_gates_take_a_parted_door_for_what_was_drawn() -> None:
+def test_the_gates_identify_a_split_door_with_the_original() -> None:
     moved = replace(door(), surfaces=tuple(replace(s, positions=s.positions + 0.01) for s in door().surfaces))  # fmt: skip
     assert not has_same_mesh(door(), moved)
     parted = joined(house(door()), 1).items[0]
     assert len(parted.surfaces) > 1
     assert has_same_mesh(parted, door())
-    # Nothing that the home had is measured as if dressing had put it there.
+    # Items of the original home are not measured as added ones.
     mutable = MutableHouse(house(door(), replace(door(), id="moved")), 1)
     mutable.items = [parted, replace(moved, id="moved")]
     assert [body.is_new for body in bodies_of(mutable, {})] == [False, True]
@@ -118,7 +118,7 @@ def test_a_share_of_nothing_changes_no_door() -> None:
     assert joined(source, 1, share=0.0).items[0].tags == source.items[0].tags
 
 
-def test_the_scheme_does_not_depend_on_who_asks_first() -> None:
+def test_the_scheme_does_not_depend_on_the_order_of_requests() -> None:
     mutable = MutableHouse(house(door()), 3)
     style = style_for(mutable.rng("style"))
     first = finish_scheme(mutable, style)
@@ -127,7 +127,7 @@ def test_the_scheme_does_not_depend_on_who_asks_first() -> None:
 
 
 @pytest.mark.slow
-def test_furniture_parts_leave_coats_as_they_are() -> None:
+def test_furniture_parts_keep_coats_unchanged() -> None:
     home, report = dress(builtin_home(), EMPTY, DressFields(), 2)
     doors = [i for i in home.items if i.kind is ItemKind.DOOR]
     assert doors

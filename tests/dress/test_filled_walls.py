@@ -1,4 +1,4 @@
-"""Pieces that fill a free wall: as long as it, as high as the room, and never before a door."""
+"""Pieces that fill a free wall have its length and the room's height, and are never in front of a door."""
 
 from __future__ import annotations
 
@@ -20,22 +20,22 @@ CATALOGUE = with_families(EMPTY)
 
 
 def filled(seed: int, share: float = 3.0) -> tuple[MutableHouse, list[tuple[Item, RoomFloor]]]:
-    """What is put into the built-in home, each with its room before that; share 3: all chances are 1."""
-    house, found = MutableHouse(builtin_home(), seed), []
+    """Pieces added to the built-in home, each with its room's free floor before; share 3 makes all chances 1."""
+    house, pieces = MutableHouse(builtin_home(), seed), []
     space = house_space(house)
     for room in space.rooms:
         before = len(house.items)
         floor, free = RoomFloor.of(house, space, room), RoomFloor.of(house, space, room)
         if floor is not None and free is not None:
             fill_wall(house, CATALOGUE, floor, "furniture", share)
-            found += [(item, free) for item in house.items[before:]]
-    return house, found
+            pieces += [(item, free) for item in house.items[before:]]
+    return house, pieces
 
 
-def test_a_filled_wall_has_nothing_free_beside_the_piece() -> None:
-    _, found = filled(1)
-    assert found
-    for item, floor in found:
+def test_a_filled_wall_has_no_space_beside_the_piece() -> None:
+    _, pieces = filled(1)
+    assert pieces
+    for item, floor in pieces:
         low, high = item.bounds
         plan = shapely.box(low[0], low[2], high[0], high[2])
         assert shapely.contains(floor.free, plan), "in the room, and in no wall"
@@ -44,7 +44,7 @@ def test_a_filled_wall_has_nothing_free_beside_the_piece() -> None:
         assert wide >= 1.3
         ceiling = float(floor.room.ceiling_y(np.array([[(low[0] + high[0]) / 2, (low[2] + high[2]) / 2]]))[0])  # fmt: skip
         assert min(ceiling - 0.02, 2.7) - float(high[1]) == pytest.approx(0, abs=0.01)
-        # Longer by a hand's width it would not fit.
+        # A hand's width longer and it would not fit.
         face = max(floor.faces, key=lambda f: _covers(f, item))
         s = face.s_of(np.asarray(item.bounds))
         y = floor.room.room.floor_y
@@ -58,10 +58,10 @@ def _covers(face: WallFace, item: Item) -> float:
     return float(np.ptp(s)) if -0.01 < out.min() < 0.05 else -1.0
 
 
-def test_equal_seeds_fill_equal_walls_and_no_share_none() -> None:
-    one, two = (house.items for house, _ in (filled(2), filled(2)))
-    assert [i.id for i in one] == [i.id for i in two]
-    assert all(np.array_equal(a.bounds, b.bounds) for a, b in zip(one, two, strict=True))
+def test_equal_seeds_fill_equal_walls_and_a_share_of_zero_none() -> None:
+    first, two = (house.items for house, _ in (filled(2), filled(2)))
+    assert [i.id for i in first] == [i.id for i in two]
+    assert all(np.array_equal(a.bounds, b.bounds) for a, b in zip(first, two, strict=True))
     assert filled(2, share=0.0)[1] == []
 
 

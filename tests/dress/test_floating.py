@@ -1,4 +1,4 @@
-"""Things in the air of a home: how much of what one sees they hide, and that the rest stays as it is."""
+"""Floating objects in a home: share of the view that they hide, and the home is unchanged."""
 
 from __future__ import annotations
 
@@ -25,20 +25,21 @@ def floating(of: House) -> list[Item]:
 
 
 def large_room() -> Room:
-    """Seven metres by six by three: many things, so that chance counts little."""
+    """A room of 7 x 6 x 3 m: many objects, so that chance matters little."""
     x, y, z = SIZE
     polygon = np.array([[0.0, 0.0], [0.0, z], [x, z], [x, 0.0]])
     return replace(room(), polygon=polygon, ceiling_y=y)
 
 
 @pytest.mark.parametrize("share", [0.1, 0.3])
-def test_about_that_share_of_what_one_sees_is_hidden(share: float) -> None:
+def test_about_the_given_share_of_the_view_is_hidden(share: float) -> None:
     x, y, z = SIZE
     floor = replace(solid("floor", [0, -0.1, 0], [x, 0, z]), kind=ItemKind.FLOOR)
     after = with_floating_things(replace(house(floor), rooms=(large_room(),)), share, 1)
     corners = corners_of_surfaces(s for item in floating(after) for s in item.surfaces)
     mesh = trimesh.Trimesh(corners.reshape(-1, 3), np.arange(3 * len(corners)).reshape(-1, 3))
-    # Ways that enter an empty room through its walls anywhere, as a cosine: their mean is 4 V / S.
+    # Cosine-distributed rays that enter an empty room anywhere through its walls: mean length 4 V /
+    # S.
     rng = np.random.default_rng(2)
     size, n = np.array(SIZE), 20_000
     areas = np.array([y * z, x * z, x * y])
@@ -55,7 +56,7 @@ def test_about_that_share_of_what_one_sees_is_hidden(share: float) -> None:
     assert hidden.mean() == pytest.approx(share, rel=0.25)
 
 
-def test_the_home_stays_as_it_is_and_things_come_after_it() -> None:
+def test_the_home_is_unchanged_and_floating_items_come_last() -> None:
     before = builtin_home()
     after = with_floating_things(before, 0.1, 1)
     for old, new in zip(before.items, after.items, strict=False):
@@ -80,7 +81,7 @@ def test_the_home_stays_as_it_is_and_things_come_after_it() -> None:
         assert 0.15 <= 2 * item.oriented_box.half.max() <= 1.0 + 1e-6
 
 
-def test_a_seed_hangs_the_same_and_another_others() -> None:
+def test_a_seed_repeats_its_items_and_another_gives_others() -> None:
     def places(seed: int) -> list[list[float]]:
         after = with_floating_things(house(FLOOR), 0.1, seed)
         return [item.oriented_box.centre.tolist() for item in floating(after)]
@@ -89,7 +90,7 @@ def test_a_seed_hangs_the_same_and_another_others() -> None:
     assert places(1) != places(2)
 
 
-def test_nothing_hangs_outdoors_or_in_a_closet() -> None:
+def test_nothing_floats_outdoors_or_in_a_closet() -> None:
     terrace = replace(house(FLOOR), rooms=(room("Terrace"),))
     assert not floating(with_floating_things(terrace, 0.3, 1))
     polygon = np.array([[0.0, 0.0], [0.0, 1.0], [1.5, 1.0], [1.5, 0.0]])
@@ -97,7 +98,7 @@ def test_nothing_hangs_outdoors_or_in_a_closet() -> None:
     assert not floating(with_floating_things(closet, 0.3, 1))
 
 
-def test_a_room_without_place_is_told() -> None:
+def test_a_room_without_space_is_reported() -> None:
     thirds = np.linspace(0, WIDTH, 4)
     blocks = [solid(f"b {a}", [a, 0.01, 0], [b, HEIGHT - 0.2, DEPTH]) for a, b in pairwise(thirds)]
     after = with_floating_things(house(FLOOR, *blocks), 0.3, 1)

@@ -1,4 +1,4 @@
-"""Furniture that is added along free walls: where it stands, what it is made of, what it leaves free."""
+"""Furniture added along free walls: placement, materials, free space."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pbrs_farm.core.classes import BOOKSHELF, COUNTER
 from pbrs_farm.core.house import Item
 from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.core.mesh import signed_volume, triangle_corners
-from pbrs_farm.dress.furniture import KINDS, _from_catalogue, add_furniture
+from pbrs_farm.dress.furniture import KINDS, add_furniture, model_from_catalogue
 from pbrs_farm.dress.models import Model
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import doors_are_joined, floor_bitmap, house_space
@@ -41,18 +41,18 @@ def _added(mutable: MutableHouse) -> list[Item]:
 
 
 def _pieces() -> list[Model]:
-    found = []
+    pieces = []
     for name, kind in KINDS.items():
         for seed in range(3):
             rng = np.random.default_rng([seed, *name.encode()])
             size = tuple(
                 float(rng.uniform(*side)) for side in (kind.width, kind.height, kind.depth)
             )
-            found.append(CASE_GOODS[kind.model].make(rng, STYLE, BOARDS, size))
-    return [*found, desk_chair.make(np.random.default_rng(1), STYLE, BOARDS)]
+            pieces.append(CASE_GOODS[kind.model].make(rng, STYLE, BOARDS, size))
+    return [*pieces, desk_chair.make(np.random.default_rng(1), STYLE, BOARDS)]
 
 
-def test_every_kind_stands_on_its_base_and_its_bodies_are_closed_and_face_outwards() -> None:
+def test_every_kind_rests_on_its_base_and_its_bodies_are_closed_and_outward() -> None:
     for piece, shape in _pieces():
         low, high = shape.bounds
         assert low[1] == pytest.approx(0.0, abs=1e-6), piece.name
@@ -63,18 +63,18 @@ def test_every_kind_stands_on_its_base_and_its_bodies_are_closed_and_face_outwar
             assert signed_volume(corners, corners[0, 0]) > 0, piece.name
 
 
-def test_a_thing_of_the_catalogue_is_of_one_s_own_library_by_its_share() -> None:
+def test_catalogue_pieces_come_from_the_users_library_by_its_share() -> None:
     _piece, shape = desk_chair.make(np.random.default_rng(1), STYLE, BOARDS)
     chest, size = KINDS["chest"], (1.0, 0.4, 0.9)
     pieces = tuple(Piece(f"T#{k}", "T", "dresser", Place.FLOOR, 17, size) for k in range(50))
     catalogue = Catalogue(pieces, lambda _piece: shape, "test", own=frozenset({"T#7"}))
     for share, least, most in ((1.0, 200, 200), (0.5, 70, 130), (0.0, 0, 20)):
-        drawn = [_from_catalogue(catalogue, chest, 1.0, seed, share) for seed in range(200)]
+        drawn = [model_from_catalogue(catalogue, chest, 1.0, seed, share) for seed in range(200)]
         ids = [model[0].id for model in drawn if model is not None]
         assert least <= ids.count("T#7") <= most, share
 
 
-def test_pieces_are_as_large_as_their_kind_says() -> None:
+def test_pieces_have_the_size_of_their_kind() -> None:
     for kind in KINDS.values():
         rng = np.random.default_rng(5)
         size = (kind.width[1], kind.height[1], kind.depth[1])
@@ -91,19 +91,21 @@ def test_pieces_are_as_large_as_their_kind_says() -> None:
 def test_the_boards_of_a_shelf_are_found_as_supports(
     name: str, size: tuple[float, float, float], least: int
 ) -> None:
-    made = CASE_GOODS[name].make(np.random.default_rng(2), STYLE, BOARDS, size)
+    shelf = CASE_GOODS[name].make(np.random.default_rng(2), STYLE, BOARDS, size)
     mutable = MutableHouse(builtin_home(), 1)
     room = mutable.source.rooms[0]
     middle = room.polygon.mean(0)
-    at = np.array([middle[0], room.floor_y, middle[1]])
-    item = mutable.placed(*made, at, 0.0, item_id="shelf", room_id=room.id, level_id=room.level_id)
+    origin = np.array([middle[0], room.floor_y, middle[1]])
+    item = mutable.placed(
+        *shelf, origin, 0.0, item_id="shelf", room_id=room.id, level_id=room.level_id
+    )
     mutable.items = [item]
-    found = supports_of_item(SceneTriangles(mutable.items), 0, room)
-    assert len(found) >= least
+    supports = supports_of_item(SceneTriangles(mutable.items), 0, room)
+    assert len(supports) >= least
 
 
 @pytest.mark.parametrize("seed", range(1, 6))
-def test_furniture_stands_on_the_floor_with_its_back_at_a_wall_of_its_room(seed: int) -> None:
+def test_furniture_is_on_the_floor_with_its_back_at_a_wall_of_its_room(seed: int) -> None:
     mutable = _draft(seed)
     space = house_space(mutable)
     stood = [i for i in _added(mutable) if "chair" not in i.name]
@@ -136,27 +138,29 @@ def test_doors_stay_free_and_joined_and_the_floor_open(seed: int) -> None:
         assert (bitmap.occupied & bitmap.inside).sum() < 0.6 * bitmap.inside.sum()
 
 
-def test_furniture_leaves_free_what_drawers_of_the_room_come_out_into() -> None:
-    # Half of a wall of the living room has chests whose drawers come out by a metre.
+def test_furniture_leaves_space_for_drawers_of_the_room() -> None:
+    # Half of a living-room wall has chests whose drawers come out by a metre.
     home = builtin_home()
     bare = [i for i in home.items if not i.id.startswith("piece_")]
     body = solid("Chest", [0.3, 0, 0.05], [3.3, 0.8, 0.5])
     front = replace(solid("", [0.3, 0.1, 0.5], [3.3, 0.7, 0.52]).surfaces[0], part="drawer")
     joint = Joint("drawer", JointKind.PRISMATIC, (0, 0, 0), (0, 0, 1), 1.0)
     chest = replace(body, surfaces=(*body.surfaces, front), joints=(joint,))
-    kept, n = shapely.box(0.3, 0.5, 3.3, 1.52), 0
+    chest_zone, n = shapely.box(0.3, 0.5, 3.3, 1.52), 0
     for seed in range(4):
         mutable = MutableHouse(replace(home, items=(*bare, chest)), seed)
         add_furniture(mutable, EMPTY, STYLE, 1.0)
         for item in _added(mutable):
             low, high = item.bounds
             n += item.room_id == "0_0"
-            assert not shapely.box(low[0], low[2], high[0], high[2]).intersects(kept), item.name
+            assert not shapely.box(low[0], low[2], high[0], high[2]).intersects(chest_zone), (
+                item.name
+            )
     assert n > 0
 
 
-def test_no_bookcase_stands_among_what_a_kitchen_is_made_of() -> None:
-    # A worktop along a wall of the living room; the rest of that wall is free.
+def test_no_bookcase_is_among_kitchen_units() -> None:
+    # A worktop along a living-room wall, the rest of which is free.
     worktop = replace(solid("Worktop", [0.0, 0, 1.2], [0.6, 0.9, 2.6]), nyu40=COUNTER)
     home = builtin_home()
     bare = [i for i in home.items if not i.id.startswith("piece_")]
@@ -166,10 +170,10 @@ def test_no_bookcase_stands_among_what_a_kitchen_is_made_of() -> None:
         add_furniture(mutable, EMPTY, STYLE, 1.0)
         for item in _added(mutable):
             if item.nyu40 == BOOKSHELF and item.room_id == "0_0":
-                apart = np.maximum(
+                gap = np.maximum(
                     item.bounds[0] - worktop.bounds[1], worktop.bounds[0] - item.bounds[1]
                 )
-                assert apart[[0, 2]].max() > 0.9
+                assert gap[[0, 2]].max() > 0.9
                 n += 1
     assert n > 0
 

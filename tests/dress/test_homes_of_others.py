@@ -1,4 +1,4 @@
-"""Homes that no Sweet Home 3D file describes: a glTF scene of two rooms, and a SUNCG house."""
+"""Homes from other formats than Sweet Home 3D: a glTF scene of two rooms, and a SUNCG house."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lamps for rooms that lack light: which rooms, where, how bright."""
+"""Lamps for rooms that lack light: choice of room, place, power."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def test_every_dark_room_gets_a_lamp_that_touches_the_ceiling(seed: int) -> None
 
 
 @pytest.mark.parametrize("seed", range(1, 6))
-def test_one_can_walk_under_a_lamp_unless_a_table_is_below(seed: int) -> None:
+def test_a_lamp_leaves_headroom_unless_a_table_is_below(seed: int) -> None:
     mutable = _dressed(_dark(), seed)
     space = house_space(mutable)
     for item in _hanging(mutable):
@@ -72,11 +72,11 @@ def test_the_flux_suits_the_area() -> None:
         assert 100 < flux * 0.45 / area < 200
 
 
-def test_a_room_with_lamps_enough_gets_none_at_its_ceiling() -> None:
+def test_a_room_with_enough_lamps_gets_no_ceiling_lamp() -> None:
     assert not _hanging(_dressed(builtin_home(), 1))
 
 
-def test_a_room_open_to_the_sky_gets_none() -> None:
+def test_a_room_open_to_the_sky_gets_no_lamp() -> None:
     home = _dark()
     bare = replace(home, items=tuple(i for i in home.items if i.kind is not ItemKind.CEILING))
     mutable = _dressed(bare, 1)
@@ -84,7 +84,7 @@ def test_a_room_open_to_the_sky_gets_none() -> None:
     assert mutable.refused["lamps: no place under the ceiling"] == 2
 
 
-def test_a_lamp_keeps_clear_of_what_reaches_the_ceiling() -> None:
+def test_a_lamp_keeps_clear_of_items_as_high_as_the_ceiling() -> None:
     home = _dark()
     tower = box("tower", np.array([2.5, 1.25, 2.0]), np.array([0.6, 1.24, 0.6]), 0)
     full = replace(home, items=(*home.items, Item("tower", "tower", ItemKind.OBJECT, "0", (tower,), 3)))  # fmt: skip
@@ -93,7 +93,7 @@ def test_a_lamp_keeps_clear_of_what_reaches_the_ceiling() -> None:
     assert high[0] < 1.9 or low[0] > 3.1 or high[2] < 1.4 or low[2] > 2.6
 
 
-def test_a_lamp_stands_on_the_nightstand_exactly() -> None:
+def test_a_lamp_rests_exactly_on_the_nightstand() -> None:
     for seed in range(1, 9):
         mutable = _dressed(_dark(), seed)
         for item in mutable.items[len(mutable.source.items) :]:
@@ -104,7 +104,7 @@ def test_a_lamp_stands_on_the_nightstand_exactly() -> None:
     pytest.fail("no seed of eight gave the nightstand a lamp")
 
 
-def test_a_lamp_of_the_catalogue_is_of_one_s_own_library_by_its_share() -> None:
+def test_catalogue_lamps_come_from_the_users_library_by_its_share() -> None:
     piece, shape = made.table_lamp(np.random.default_rng(1), STYLE)
     pieces = tuple(replace(piece, id=f"T#{k}") for k in range(50))
     catalogue = Catalogue(pieces, lambda _piece: shape, "test", own=frozenset({"T#7"}))
@@ -127,7 +127,7 @@ def test_a_seed_decides_every_bit_and_no_share_adds_nothing() -> None:
     "make",
     [made.ceiling_dome, made.globe_pendant, made.shade_pendant, made.floor_lamp, made.table_lamp],
 )
-def test_a_generated_lamp_stands_at_zero_and_its_light_is_in_its_emitting_part(make) -> None:  # type: ignore[no-untyped-def]
+def test_a_generated_lamp_rests_at_zero_and_its_light_is_in_its_emitting_part(make) -> None:  # type: ignore[no-untyped-def]
     piece, shape = make(np.random.default_rng(1), STYLE)
     assert shape.bounds[0, 1] == pytest.approx(0, abs=1e-6)
     (light,) = shape.lights

@@ -1,4 +1,4 @@
-"""How little was tidied up: chairs, pictures, beds, clothes; never against a gate, and none of it at 0."""
+"""Mess: chairs, pictures, beds, clothes; it breaks no gate, and 0 adds none."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ TABLE_ITEM = replace(solid("table", [1.2, 0.72, 1.0], [2.8, 0.75, 1.8]), nyu40=T
 
 
 def _chair(name: str, x: float, z: float) -> Item:
-    """A chair 40 cm wide before the table, its back to -z."""
+    """A chair 40 cm wide in front of the table, its back to -z."""
     parts = [([x, 0.0, z], [x + 0.4, 0.45, z + 0.4]), ([x, 0.45, z], [x + 0.4, 0.9, z + 0.03])]
     return boards(name, parts, CHAIR)
 
@@ -60,7 +60,7 @@ def _moves(seed: int, share: float) -> list[float]:
     return [float(np.linalg.norm(a.bounds.mean(0) - b.bounds.mean(0))) for a, b in pairs]
 
 
-def test_chairs_stand_apart_by_a_few_centimetres_and_some_are_pulled_out() -> None:
+def test_chairs_move_by_centimetres_and_some_are_pulled_out() -> None:
     few = [m for seed in range(12) for m in _moves(seed, 0.001)]
     many = [m for seed in range(12) for m in _moves(seed, 1.0)]
     assert len({round(m, 3) for m in few}) > 12
@@ -68,7 +68,7 @@ def test_chairs_stand_apart_by_a_few_centimetres_and_some_are_pulled_out() -> No
     assert np.mean([m > 0.1 for m in many]) > 0.6
 
 
-def test_a_chair_is_not_pulled_into_what_stands_behind_it_or_through_a_wall() -> None:
+def test_a_chair_is_not_pulled_into_furniture_or_through_a_wall() -> None:
     cupboard = solid("cupboard", [1.0, 0.0, 0.35], [3.0, 1.0, 0.66])
     for seed in range(8):
         mutable = MutableHouse(house(TABLE_ITEM, _chair("a", 1.4, 0.7), cupboard), seed, 1.0)
@@ -81,7 +81,7 @@ def test_a_chair_is_not_pulled_into_what_stands_behind_it_or_through_a_wall() ->
         assert at_wall.items[1].bounds[0, 2] > -0.001
 
 
-def test_a_picture_hangs_a_degree_askew_in_its_own_plane() -> None:
+def test_a_picture_is_a_degree_askew_in_its_plane() -> None:
     piece = Piece(
         "generated#picture", "Picture", "picture_frame", Place.WALL, PICTURE, (0.5, 0.02, 0.4)
     )
@@ -91,9 +91,9 @@ def test_a_picture_hangs_a_degree_askew_in_its_own_plane() -> None:
     angles = []
     for seed in range(12):
         mutable = MutableHouse(house(), seed, 0.5)
-        at = np.array([2.0, 1.4, 0.001])
+        centre = np.array([2.0, 1.4, 0.001])
         item = mutable.placed(
-            piece, shape, at, 0.0, item_id="dress-walls-0", room_id="0_0", level_id="0"
+            piece, shape, centre, 0.0, item_id="dress-walls-0", room_id="0_0", level_id="0"
         )
         mutable.add(item, "walls", piece)
         tilt_pictures(mutable, EMPTY, STYLE, 0.5)
@@ -124,49 +124,49 @@ def test_a_bed_has_a_duvet_and_as_many_pillows_as_people_sleep_there(width: floa
         pillows = [i for i in added if i.source_class == "generated#pillow"]
         duvets = [i for i in added if i.source_class == "generated#duvet"]
         assert (len(pillows), len(duvets)) == (n, 1)
-        # The pillows lie at the head, the duvet below them over the rest.
+        # The pillows are at the head, the duvet covers the rest.
         assert max(p.bounds[1, 0] for p in pillows) < duvets[0].bounds[0, 0]
         assert duvets[0].bounds[1, 0] > 1.95
 
 
-def test_clothes_on_a_seat_hang_on_no_post_behind_it() -> None:
+def test_clothes_on_a_seat_do_not_hang_on_a_post_behind_it() -> None:
     posts = [([x, 0.0, 0.4], [x + 0.04, 0.95, 0.44]) for x in (0.0, 0.12, 0.24, 0.36)]
     chair = boards("Chair", [([0.0, 0.0, 0.0], [0.4, 0.45, 0.4]), *posts], CHAIR)
-    found = []
+    clothes = []
     for seed in range(6):
         mutable = MutableHouse(house(chair, name="Bedroom"), seed, 1.0)
         rng = mutable.rng("test")
         stock = Stock(EMPTY, book_covers(rng, STYLE), 1)
         placing = Placing(mutable, stock, mutable.source.rooms[0], STYLE, rng, 1.0)
         drop_clothes(placing, SceneTriangles(mutable.items), np.array([0.2, 0.2]), 0.45)
-        found += mutable.items[1:]
-    # What finds no place on the seat stays in the wardrobe.
-    assert len(found) >= 3
-    assert max(float(item.bounds[1, 1]) for item in found) < 0.65
+        clothes += mutable.items[1:]
+    # Clothes without a place on the seat stay in the wardrobe.
+    assert len(clothes) >= 3
+    assert max(float(item.bounds[1, 1]) for item in clothes) < 0.65
 
 
 FOLDS = Folds(9, 0.03, 0.04, (0.2, 0.6))
 
 
 def _ground(item: Item, thread_m: float) -> Ground:
-    """The ground of one item in a frame that begins at the world's origin."""
+    """The ground of one item, in a frame that starts at the world's origin."""
     grid = PlanGrid(np.zeros(2), 0.0, CELL_M, (260, 260))
     return Ground.of(grid, item_triangles(item), 0.0, 1.0, thread_m / 2)
 
 
 def _fallen(net: Net, ground: Ground, thick_m: float) -> Net:
-    made = drape(net, ground, thick_m, FOLDS, np.random.default_rng(2))
-    assert made is not None
-    return made
+    cloth = drape(net, ground, thick_m, FOLDS, np.random.default_rng(2))
+    assert cloth is not None
+    return cloth
 
 
-def test_cloth_that_fell_lies_on_what_is_below_it_hangs_over_its_edge_and_enters_nothing() -> None:
+def test_fallen_cloth_covers_its_ground_hangs_over_its_edge_and_enters_nothing() -> None:
     block, thick = solid("block", [0.5, 0.0, 0.5], [2.1, 0.5, 2.5]), 0.02
     corners, ground = item_triangles(block), _ground(block, 0.06)
     net = flat_net((1.2, 1.0), 0.06, (0.6, 0.6, 1.5), 0.1)
-    made = [_fallen(net, ground, thick) for _ in range(2)]
-    assert np.array_equal(made[0].points, made[1].points)
-    sheet = sheet_of("cloth", made[0], ground, thick)
+    cloths = [_fallen(net, ground, thick) for _ in range(2)]
+    assert np.array_equal(cloths[0].points, cloths[1].points)
+    sheet = sheet_of("cloth", cloths[0], ground, thick)
     points = sheet.positions.astype(np.float64)
     places = np.unique(
         np.round(triangle_corners(sheet.positions, sheet.faces).reshape(-1, 3), 6),
@@ -177,13 +177,14 @@ def test_cloth_that_fell_lies_on_what_is_below_it_hangs_over_its_edge_and_enters
     over = points[:, 1] - np.maximum(highest_below(points[:, [0, 2]], corners), 0.0)
     assert 0.0 < over.min() < 0.002
     assert points[:, 1].min() < 0.3
-    # What folds take is drawn in from the edges: cloth neither grows nor shrinks away.
-    assert np.median(made[0].stretches()) == pytest.approx(1.0, abs=0.03)
+    # Folds draw cloth in from the edges: cloth neither stretches nor shrinks.
+    assert np.median(cloths[0].stretches()) == pytest.approx(1.0, abs=0.03)
     assert sheet.uvs is not None
     assert np.ptp(sheet.uvs, axis=0) == pytest.approx([1.2, 1.0], abs=1e-6)
 
 
-# A board across the bed's foot, its top above the mattress; the back of a sofa, thinner than threads are apart.
+# A board across the foot of the bed, its top above the mattress; the back of a sofa, thinner than
+# the spacing of threads.
 @pytest.mark.parametrize(
     ("parts", "size", "thread_m", "thick_m", "turn"),
     [
@@ -192,23 +193,23 @@ def test_cloth_that_fell_lies_on_what_is_below_it_hangs_over_its_edge_and_enters
     ],
     ids=["bed", "sofa"],
 )  # fmt: skip
-def test_cloth_is_not_torn_by_what_rises_below_it(
+def test_obstacles_below_do_not_tear_cloth(
     parts: list[tuple[list[float], list[float]]], size: tuple[float, float], thread_m: float,
     thick_m: float, turn: float,
 ) -> None:  # fmt: skip
     ground = _ground(boards("piece", parts, BED), thread_m)
     middle = (1.3, 0.95, 1.6)
-    made = _fallen(flat_net(size, thread_m, middle, turn), ground, thick_m)
-    stretches = made.stretches()
+    cloth = _fallen(flat_net(size, thread_m, middle, turn), ground, thick_m)
+    stretches = cloth.stretches()
     assert np.percentile(stretches, 99) < 1.2 < MOST_STRETCH
     assert stretches.max() < 2.0
-    assert made.deepest_m(ground) == 0.0
-    # It fell, on both sides of what rises.
-    assert made.points[..., 1].min() < 0.6
+    assert cloth.deepest_m(ground) == 0.0
+    # It fell on both sides of the obstacle.
+    assert cloth.points[..., 1].min() < 0.6
 
 
-def test_cloth_that_finds_no_way_to_fall_lies_flat_where_that_is_level() -> None:
-    # A post of a hand's height through the middle of the net: it begins in it.
+def test_cloth_that_cannot_fall_stays_flat_on_level_ground() -> None:
+    # A post as high as a hand through the middle of the net, which starts inside it.
     parts = [([0.5, 0, 0.5], [2.1, 0.4, 2.4]), ([1.2, 0.4, 1.2], [1.5, 0.9, 1.5])]
     ground = _ground(boards("block", parts, BED), 0.05)
     low = flat_net((1.0, 0.8), 0.05, (1.35, 0.41, 1.35), 0.0)
@@ -223,19 +224,19 @@ def test_cloth_that_finds_no_way_to_fall_lies_flat_where_that_is_level() -> None
     assert 0.3 < np.ptp(flat.points[..., 0]) <= 1.0
 
 
-def test_a_point_leaves_what_is_solid_by_the_shorter_way() -> None:
+def test_a_point_leaves_a_solid_by_the_shorter_way() -> None:
     ground = _ground(solid("block", [0.5, 0.0, 0.5], [1.5, 0.5, 1.5]), 0.02)
     wide = ground.grown_m
     points = np.array([[1.0, 0.48, 1.0], [1.46, 0.3, 1.0], [1.0, 0.3, 0.53], [2.0, 0.3, 1.0]]).T
     moved = (points + ground.ways_out(points, 0.01)).T
     assert moved[0] == pytest.approx([1.0, 0.51, 1.0])
-    # To a side it goes by a cell farther than the block is wide, and up to another that it touches.
+    # It leaves sideways by one cell more than the block's width, and upwards until it touches.
     assert moved[1] == pytest.approx([1.5 + wide + 0.01, 0.3, 1.0], abs=CELL_M + 1e-9)
     assert moved[2] == pytest.approx([1.0, 0.3, 0.5 - wide - 0.01], abs=CELL_M + 1e-9)
     assert moved[3] == pytest.approx([2.0, 0.3, 1.0])
 
 
-def test_shoes_stand_apart_and_on_their_soles() -> None:
+def test_shoes_are_apart_and_on_their_soles() -> None:
     pair = [
         box("s", np.array([x, 0.04, 0.0]), np.array([0.04, 0.04, 0.13]), 0) for x in (-0.05, 0.05)
     ]
@@ -258,7 +259,7 @@ def test_shoes_stand_apart_and_on_their_soles() -> None:
 
 
 def test_a_recipe_that_does_not_name_the_mess_keeps_its_digest() -> None:
-    told = recipe_from_name("fast", {"dress.seed": "3", "dress.mess": "0.3"})
+    messy = recipe_from_name("fast", {"dress.seed": "3", "dress.mess": "0.3"})
     untold = recipe_from_name("fast", {"dress.seed": "3"})
-    other = recipe_from_name("fast", {"dress.seed": "3", "dress.mess": "0.6"})
-    assert told.digest() == untold.digest() != other.digest()
+    messier = recipe_from_name("fast", {"dress.seed": "3", "dress.mess": "0.6"})
+    assert messy.digest() == untold.digest() != messier.digest()

@@ -1,4 +1,4 @@
-"""The bank of painted materials: what is kept is what would be painted."""
+"""The bank of painted materials returns exactly the materials that would be painted."""
 
 from __future__ import annotations
 
@@ -36,13 +36,13 @@ def _counting(calls: list[int]) -> Callable[[], Painted]:
     return paint
 
 
-def test_another_process_finds_what_one_has_painted(tmp_path: Path) -> None:
+def test_a_process_finds_pictures_painted_by_another(tmp_path: Path) -> None:
     assert PaintedBank(tmp_path).painted("oak", lambda: OAK) == OAK
     assert PaintedBank(tmp_path).painted("oak", _never) == OAK
 
 
 @pytest.mark.parametrize("damage", [b"", b"x", b"\n\n\n"])
-def test_a_damaged_file_is_painted_anew(tmp_path: Path, damage: bytes) -> None:
+def test_a_damaged_file_is_painted_again(tmp_path: Path, damage: bytes) -> None:
     PaintedBank(tmp_path).painted("oak", lambda: OAK)
     (file,) = tmp_path.iterdir()
     file.write_bytes(damage or file.read_bytes()[:-1])
@@ -52,7 +52,7 @@ def test_a_damaged_file_is_painted_anew(tmp_path: Path, damage: bytes) -> None:
     assert PaintedBank(tmp_path).painted("oak", _never) == OAK
 
 
-def test_a_folder_that_cannot_be_written_costs_time_alone(tmp_path: Path) -> None:
+def test_a_folder_that_cannot_be_written_costs_only_time(tmp_path: Path) -> None:
     (tmp_path / "file").write_bytes(b"")
     assert PaintedBank(tmp_path / "file").painted("oak", lambda: OAK) == OAK
 
@@ -64,23 +64,23 @@ def test_a_bank_stays_below_its_size(tmp_path: Path) -> None:
     assert 0 < sum(f.stat().st_size for f in tmp_path.iterdir()) < 400 * 400
 
 
-def test_a_home_is_the_same_whether_the_bank_was_full_or_empty(tmp_path: Path) -> None:
-    made = []
+def test_a_home_does_not_depend_on_the_banks_contents(tmp_path: Path) -> None:
+    pictures = []
     for bank in (PaintedBank(None), PaintedBank(tmp_path), PaintedBank(tmp_path)):
         house = MutableHouse(builtin_home(), 1, bank=bank)
         pattern = pattern_material(house, Pattern("paint", 1, ((0.8, 0.7, 0.6),)))
-        made.append((house.materials[pattern.number], pattern.mean_rgb, house.textures))
+        pictures.append((house.materials[pattern.number], pattern.mean_rgb, house.textures))
         house.close()
-    assert made[0] == made[1] == made[2]
+    assert pictures[0] == pictures[1] == pictures[2]
 
 
 def test_surfaces_of_two_tints_share_a_picture_and_have_their_colours() -> None:
     house = MutableHouse(builtin_home(), 1)
     tints = ((0.86, 0.7, 0.6), (0.8, 0.85, 0.77), (0.3, 0.2, 0.1))
-    made = [pattern_material(house, Pattern("paint", 1, (tint,))) for tint in tints]
-    materials = [house.materials[m.number] for m in made]
+    painted = [pattern_material(house, Pattern("paint", 1, (tint,))) for tint in tints]
+    materials = [house.materials[m.number] for m in painted]
     assert materials[0].texture_id == materials[1].texture_id != materials[2].texture_id
-    for tint, material, pattern in zip(tints, materials, made, strict=True):
+    for tint, material, pattern in zip(tints, materials, painted, strict=True):
         texture = house.textures[material.texture_id or ""]
         picture = decode_texture(texture.data, texture.name, texture.media_type)
         linear = linear_from_srgb(picture / 255).mean((0, 1)) * linear_from_srgb(

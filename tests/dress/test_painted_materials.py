@@ -1,4 +1,4 @@
-"""A mutable house's materials: painted beside what follows, once each, in the order they were asked for."""
+"""A mutable house's materials: painted in parallel, once each, numbered in the order of requests."""
 
 from threading import Event
 
@@ -18,17 +18,17 @@ def _painted(name: str) -> Painted:
     return Painted(Material(name, texture_id=name), (_texture(name),), (0.5, 0.5, 0.5))
 
 
-def test_who_needs_a_material_paints_it_while_the_thread_is_at_another() -> None:
+def test_a_reader_paints_a_material_itself_while_the_thread_is_busy() -> None:
     materials, begun, go_on = PaintedMaterials([PLAIN], {}), Event(), Event()
 
-    def held() -> Painted:
+    def waiting() -> Painted:
         begun.set()
         go_on.wait(60)
         return _painted("held")
 
-    slow, _ = materials.paint(held)
+    slow, _ = materials.paint(waiting)
     fast, painting = materials.paint(lambda: _painted("fast"))
-    assert begun.wait(60)  # the thread paints, and does not end before it is let
+    assert begun.wait(60)  # the thread is painting, and waits for a signal to end
     assert materials[fast].name == "fast"
     assert painting.painted().mean_rgb == (0.5, 0.5, 0.5)
     go_on.set()
@@ -36,7 +36,7 @@ def test_who_needs_a_material_paints_it_while_the_thread_is_at_another() -> None
     assert materials[0] == PLAIN
 
 
-def test_a_thread_paints_what_nobody_has_asked_for_yet() -> None:
+def test_a_thread_paints_materials_before_they_are_read() -> None:
     materials, done = PaintedMaterials([], {}), Event()
 
     def paint() -> Painted:
@@ -47,7 +47,7 @@ def test_a_thread_paints_what_nobody_has_asked_for_yet() -> None:
     assert done.wait(60)
 
 
-def test_a_material_is_painted_once_however_often_it_is_read() -> None:
+def test_a_material_read_repeatedly_is_painted_once() -> None:
     materials, calls = PaintedMaterials([], {}), list[int]()
 
     def paint() -> Painted:
@@ -60,14 +60,14 @@ def test_a_material_is_painted_once_however_often_it_is_read() -> None:
     assert len(calls) == 1
 
 
-def test_textures_stand_in_the_order_of_asking_not_of_painting() -> None:
+def test_textures_are_in_the_order_of_requests_rather_than_of_painting() -> None:
     materials, go_on = PaintedMaterials([], {"old": _texture("old")}), Event()
 
-    def held() -> Painted:
+    def waiting() -> Painted:
         go_on.wait(60)
         return _painted("held")
 
-    materials.paint(held)
+    materials.paint(waiting)
     second, _ = materials.paint(lambda: _painted("second"))
     materials.add(Material("named", texture_id="named"), [_texture("named")])
     assert materials[second].texture_id == "second"
@@ -75,7 +75,7 @@ def test_textures_stand_in_the_order_of_asking_not_of_painting() -> None:
     assert list(materials.textures()) == ["old", "held", "second", "named"]
 
 
-def test_the_error_of_a_painter_reaches_who_reads_the_material() -> None:
+def test_a_painters_error_reaches_the_reader_of_the_material() -> None:
     materials = PaintedMaterials([PLAIN], {})
 
     def fail() -> Painted:
@@ -87,7 +87,7 @@ def test_the_error_of_a_painter_reaches_who_reads_the_material() -> None:
         _ = materials[number]
 
 
-def test_equal_materials_have_one_number() -> None:
+def test_equal_materials_share_a_number() -> None:
     materials = PaintedMaterials([PLAIN], {})
     number, _ = materials.paint(lambda: _painted("a"))
     assert materials.add(PLAIN, ()) == 0
@@ -103,10 +103,10 @@ def test_a_painted_material_that_was_read_keeps_its_number_when_it_is_added() ->
     assert len(materials) == 2
 
 
-def test_a_draft_that_is_given_up_paints_no_more() -> None:
+def test_a_closed_draft_stops_painting() -> None:
     materials, begun, go_on, painted = PaintedMaterials([], {}), Event(), Event(), list[str]()
 
-    def held() -> Painted:
+    def waiting() -> Painted:
         begun.set()
         go_on.wait(60)
         return _painted("held")
@@ -115,10 +115,10 @@ def test_a_draft_that_is_given_up_paints_no_more() -> None:
         painted.append("later")
         return _painted("later")
 
-    materials.paint(held)
+    materials.paint(waiting)
     materials.paint(later)
     assert begun.wait(60)
     materials.close()
     go_on.set()
-    materials._thread.shutdown(wait=True)
+    materials.painter.shutdown(wait=True)
     assert not painted

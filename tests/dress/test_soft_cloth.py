@@ -1,4 +1,4 @@
-"""Generated soft things in one plain colour get threads, and some a print."""
+"""Generated soft items in one plain colour get threads, and some a print."""
 
 from __future__ import annotations
 
@@ -37,31 +37,31 @@ def material_of(mutable: MutableHouse, index: int = 0) -> Material:
 
 
 def test_a_plain_cushion_shows_threads_and_keeps_its_colour_unless_it_is_printed() -> None:
-    seen = [woven(cushion(), seed=seed) for seed in range(12)]
-    families = {material_of(m).name.split("-")[0] for m in seen}
+    woven_items = [woven(cushion(), seed=seed) for seed in range(12)]
+    families = {material_of(m).name.split("-")[0] for m in woven_items}
     assert {"wallpaper"} < families <= {"wallpaper", "weave", "twill"}
-    for mutable in seen:
+    for mutable in woven_items:
         cloth = material_of(mutable)
         assert cloth.texture_id
         assert mutable.items[0].surfaces[0].uvs is not None
         if not cloth.name.startswith("wallpaper"):
-            (kept,) = (v for v in mutable.kept.values() if isinstance(v, PatternMaterial))
-            mean = np.array(kept.mean_rgb) * linear_from_srgb(np.array(cloth.diffuse))
+            (print_material,) = (v for v in mutable.kept.values() if isinstance(v, PatternMaterial))
+            mean = np.array(print_material.mean_rgb) * linear_from_srgb(np.array(cloth.diffuse))
             np.testing.assert_allclose(mean, linear_from_srgb(np.array(RED)), rtol=0.05)
 
 
-def test_what_has_one_colour_in_one_room_gets_one_look() -> None:
+def test_parts_of_one_colour_in_one_room_get_one_material() -> None:
     for seed in range(4):
         mutable = woven(cushion("a"), cushion("b", 2.0), seed=seed)
         assert material_of(mutable, 0) == material_of(mutable, 1)
 
 
-def test_bed_linen_is_not_printed_where_the_table_says_so() -> None:
+def test_bed_linen_is_not_printed_if_the_table_excludes_it() -> None:
     names = {material_of(woven(cushion(), name="pillow", seed=s)).name for s in range(8)}
     assert all(name.startswith("twill") for name in names)
 
 
-def test_a_packed_models_name_is_known_and_no_other_material_changes() -> None:
+def test_a_packed_models_name_is_recognised_and_no_other_material_changes() -> None:
     assert material_of(woven(cushion(), name="m3_cushion")).texture_id
     for name in ("shade fabric", "china", "cushion shop"):
         assert woven(cushion(), name=name).items[0].surfaces[0].material == 0
@@ -69,7 +69,7 @@ def test_a_packed_models_name_is_known_and_no_other_material_changes() -> None:
     assert woven(cushion(), share=0.0).items[0].surfaces[0].material == 0
 
 
-def test_the_large_plain_parts_of_a_sofa_are_woven_in_their_own_colour_and_its_feet_stay() -> None:
+def test_the_large_plain_parts_of_a_sofa_keep_their_colour_and_its_feet_stay() -> None:
     sofa = solid("s", [0, 0, 0], [2, 0.8, 0.9], NYU40_NAMES.index("sofa"))
     assert material_of(woven(sofa, name="cojines")).texture_id
     for name in ("steel", "oak wood"):

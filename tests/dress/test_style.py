@@ -8,7 +8,7 @@ from pbrs_farm.dress.style import STYLES, room_style, style_for
 
 
 @pytest.mark.parametrize("name", STYLES)
-def test_every_style_can_be_asked_for_and_has_colours_between_0_and_1(name: str) -> None:
+def test_every_style_is_available_and_has_colours_between_0_and_1(name: str) -> None:
     style = style_for(np.random.default_rng(1), name)
     assert style.name == name
     colours = [*style.palette, *style.textiles, style.accent, style.wood.mean, style.metal.colour]
@@ -30,6 +30,6 @@ def test_a_fifth_of_the_rooms_has_another_taste_and_the_homes_wood() -> None:
     assert {r.wood for r in rooms} == {home.wood}
 
 
-def test_an_unknown_style_is_one_clear_line() -> None:
+def test_an_unknown_style_is_refused_in_one_line() -> None:
     with pytest.raises(BadRecipe, match="no style 'gothic'"):
         style_for(np.random.default_rng(0), "gothic")

@@ -1,4 +1,4 @@
-"""What things can stand on is found in raw meshes."""
+"""Supporting surfaces are found in raw meshes."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_a_solid_boxs_top_is_its_only_support() -> None:
     assert not support.is_covered
 
 
-def test_a_bookcases_inner_shelves_are_supports_open_to_the_front_alone() -> None:
+def test_a_bookcases_inner_shelves_are_supports_open_only_to_the_front() -> None:
     supports = _supports(bookcase(n_shelves=4))
     assert [round(s.above_floor, 2) for s in supports] == [0.12, 0.59, 1.06, 1.53, 2.0]
     for shelf in supports[:-1]:
@@ -40,7 +40,7 @@ def test_a_thin_top_that_faces_downwards_is_a_support() -> None:
     assert support.area == pytest.approx(0.96, rel=0.05)
 
 
-def test_what_stands_on_a_table_takes_its_place() -> None:
+def test_contents_of_a_table_take_their_place() -> None:
     table, tv = (
         solid("table", [1, 0, 1], [2, 0.7, 1.5]),
         solid("tv", [1.2, 0.7, 1.1], [1.5, 1, 1.3]),
@@ -61,7 +61,7 @@ def test_the_inside_of_a_closed_cabinet_is_no_support() -> None:
     assert heights == pytest.approx([1.82])
 
 
-def test_a_turned_table_has_its_own_axes() -> None:
+def test_a_turned_table_has_turned_axes() -> None:
     table = solid("table", [1, 0, 1], [2, 0.7, 1.5])
     turn = np.radians(30)
     c, s = np.cos(turn), np.sin(turn)
@@ -80,7 +80,7 @@ def test_a_support_outside_the_room_is_left_out() -> None:
 
 
 def _basin(depth_m: float) -> Item:
-    """A worktop 1 x 0.6 m at 0.9 m with a bowl in its middle, 40 cm square, of boards of 1 cm."""
+    """A worktop of 1 x 0.6 m at 0.9 m with a bowl in its middle, 40 cm square, of boards of 1 cm."""
     x0, x1, z0, z1, top = 1.3, 1.7, 1.1, 1.5, 0.9
     low = top - depth_m
     plates = [([1.0, 0.88, 1.0], [x0, top, 1.6]), ([x1, 0.88, 1.0], [2.0, top, 1.6])]
@@ -106,10 +106,10 @@ def test_a_worktop_seen_in_the_bowl_of_a_sink_is_no_support() -> None:
     assert not _supports(worktop, _basin(0.15))
 
 
-def test_a_rooms_floor_is_what_nothing_stands_on_of_its_floor_faces() -> None:
+def test_a_rooms_floor_is_the_free_part_of_its_floor_faces() -> None:
     slab = replace(solid("floor", [0, -0.1, 0], [3, 0, 3]), kind=ItemKind.FLOOR)
-    # A rug and a chest take their place; a lamp 2 m above the floor does not, nor is there a floor
-    # beyond x = 3 m, where the room goes on.
+    # A rug and a chest take their place; a lamp 2 m above the floor does not. Beyond x = 3 m the
+    # room has no floor.
     rug, chest = solid("rug", [0, 0, 0], [1, 0.01, 1]), solid("chest", [0, 0, 2], [1, 0.9, 3])
     lamp = solid("lamp", [2, 2, 2], [2.5, 2.3, 2.5])
     support = floor_support(SceneTriangles([slab, rug, chest, lamp]), room())

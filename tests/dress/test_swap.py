@@ -88,16 +88,18 @@ def test_a_new_model_keeps_back_axis_and_floor_within_the_old_footprint(turn_deg
     old = _item("d", DRESSER, [2.0, 0.02, 1.5], 17, turn_deg=turn_deg)
     mutable = _swapped(_catalogue(("dresser", "new", (1.0, 0.45, 0.85))), old)
     turn = rotation_y(np.radians(turn_deg))
-    own, was = (_corners(i) @ turn for i in (mutable.items[0], old))
+    new_corners, was = (_corners(i) @ turn for i in (mutable.items[0], old))
     assert mutable.items[0].source_class == "T#new"
-    assert_allclose(own[:, 2].min(), was[:, 2].min(), atol=1e-5)
-    assert_allclose(own[:, 1].min(), was[:, 1].min(), atol=1e-5)
-    assert_allclose((own.min(0) + own.max(0))[0], (was.min(0) + was.max(0))[0], atol=1e-5)
-    assert (np.ptp(own, axis=0) <= np.ptp(was, axis=0) * [1, 1.15, 1] + 1e-5).all()
-    assert (np.ptp(own, axis=0) >= np.ptp(was, axis=0) * [0.75, 0.85, 0.75] - 1e-5).all()
+    assert_allclose(new_corners[:, 2].min(), was[:, 2].min(), atol=1e-5)
+    assert_allclose(new_corners[:, 1].min(), was[:, 1].min(), atol=1e-5)
+    assert_allclose(
+        (new_corners.min(0) + new_corners.max(0))[0], (was.min(0) + was.max(0))[0], atol=1e-5
+    )
+    assert (np.ptp(new_corners, axis=0) <= np.ptp(was, axis=0) * [1, 1.15, 1] + 1e-5).all()
+    assert (np.ptp(new_corners, axis=0) >= np.ptp(was, axis=0) * [0.75, 0.85, 0.75] - 1e-5).all()
 
 
-def test_a_thing_drawn_two_millimetres_above_the_floor_gives_way_to_one_that_stands_on_it() -> None:
+def test_an_item_two_millimetres_above_the_floor_gets_a_standing_replacement() -> None:
     old = _item("d", DRESSER, [2.0, 0.002, 1.5], 17)
     mutable = _swapped(_catalogue(("dresser", "new", (1.0, 0.45, 0.85))), old)
     assert mutable.items[0].source_class == "T#new"
@@ -109,12 +111,12 @@ def test_a_thing_drawn_two_millimetres_above_the_floor_gives_way_to_one_that_sta
     [
         (0.16, Place.FLOOR, 0.0, False),  # a standing model would float
         (0.16, Place.WALL, 0.0, True),
-        (0.16, Place.FLOOR, 0.2, True),  # its library hangs it
-        (0.0, Place.FLOOR, 0.2, False),  # a hung model would lie on the floor
+        (0.16, Place.FLOOR, 0.2, True),  # its library hangs it on a wall
+        (0.0, Place.FLOOR, 0.2, False),  # a hung model would drop to the floor
         (0.0, Place.FLOOR, 0.0, True),
     ],
 )
-def test_what_hangs_stays_hung_and_what_stands_keeps_standing(
+def test_hung_items_stay_hung_and_standing_ones_standing(
     above_m: float, place: Place, low_m: float, is_swapped: bool
 ) -> None:
     catalogue = _catalogue(("dresser", "new", DRESSER))
@@ -126,14 +128,14 @@ def test_what_hangs_stays_hung_and_what_stands_keeps_standing(
     assert ("swap: no other model is held as the old one is" in mutable.refused) is not is_swapped
 
 
-def test_a_thing_on_a_platform_stands_and_does_not_hang() -> None:
+def test_an_item_on_a_platform_stands_rather_than_hangs() -> None:
     platform = solid("platform", [1.0, 0.0, 1.0], [3.0, 0.3, 2.0])
     catalogue = _catalogue(("dresser", "new", DRESSER))
     mutable = _swapped(catalogue, _item("d", DRESSER, [2.0, 0.3, 1.5], 17), platform)
     assert mutable.items[0].source_class == "T#new"
 
 
-def test_it_keeps_its_id_and_says_what_it_was_made_from() -> None:
+def test_a_replacement_keeps_the_id_and_names_its_source() -> None:
     mutable = _swapped(_catalogue(("dresser", "new", DRESSER)), _item("d", DRESSER, [2, 0, 1], 17))
     item = mutable.items[0]
     assert (item.id, item.nyu40, item.room_id, len(mutable.items)) == ("d", 17, "0_0", 1)
@@ -149,7 +151,7 @@ def test_a_model_of_another_size_does_not_fit(size: Size) -> None:
 
 
 def test_a_seat_that_looks_another_way_than_its_box_keeps_its_back_rest_behind() -> None:
-    # Its box says +z, its back rest stands at +x.
+    # The front of its box is +z, but its backrest is at +x.
     old = _item("c", (0.45, 0.45, 0.9), [2, 0, 1], 5, turn_deg=-90.0, is_seat=True)
     assert old.box is not None
     old = replace(old, box=replace(old.box, axes=np.eye(3)))
@@ -160,7 +162,7 @@ def test_a_seat_that_looks_another_way_than_its_box_keeps_its_back_rest_behind()
 
 
 @pytest.mark.parametrize(("name", "is_kept"), [("Balcony", True), ("Living room", False)])
-def test_a_chair_on_a_balcony_stays_and_one_in_a_room_is_swapped(name: str, is_kept: bool) -> None:
+def test_a_chair_on_a_balcony_stays_and_an_indoor_one_is_swapped(name: str, is_kept: bool) -> None:
     size = (0.5, 0.5, 0.9)
     home = house(_item("chair", size, [1, 0, 1], 5, is_seat=True), name=name)
     mutable = MutableHouse(home, 3)
@@ -182,7 +184,7 @@ def test_no_grown_up_gets_a_childs_chair_and_no_child_a_grown_ups() -> None:
     assert new.source_class == "T#childChair"
 
 
-def test_chairs_of_one_room_get_one_model() -> None:
+def test_chairs_of_one_room_get_the_same_model() -> None:
     size = (0.45, 0.45, 0.9)
     catalogue = _catalogue(*(("chair", f"n{k}", (0.45, 0.43, 0.88 + 0.01 * k)) for k in range(6)))
     chairs = [_item(f"c{k}", size, [1.0 + k, 0, 1], 5, is_seat=True) for k in range(3)]
@@ -193,7 +195,7 @@ def test_chairs_of_one_room_get_one_model() -> None:
 
 
 @pytest.mark.long
-def test_a_library_of_one_s_own_gets_its_share_of_what_is_swapped_however_small_it_is() -> None:
+def test_a_users_library_of_any_size_gets_its_share_of_swaps() -> None:
     catalogue = _catalogue(*(("dresser", f"n{k}", (1.2, 0.5, 0.8)) for k in range(50)))
     one_own = replace(catalogue, own=frozenset({"T#n7"}))
     drawn = {"none": (catalogue, 0.5), "half": (one_own, 0.5), "even": (one_own, 0.0)}
@@ -201,14 +203,14 @@ def test_a_library_of_one_s_own_gets_its_share_of_what_is_swapped_however_small_
         name: [_swapped_dresser(library, share, seed) for seed in range(60)]
         for name, (library, share) in drawn.items()
     }
-    # Half of 60 draws and a fiftieth of the rest, three standard deviations either way.
+    # Half of 60 draws plus a fiftieth of the rest, three standard deviations either way.
     assert 19 <= models["half"].count("T#n7") <= 42
-    # Without a library of one's own, or with a share of 0, what is drawn is as it was.
+    # Without a library of the user's, or with a share of 0, the draws are unchanged.
     assert models["none"] == models["even"]
     assert models["none"].count("T#n7") < 8
-    # A choice that is not the user's is the one that there was before.
-    kept = [now == before for now, before in zip(models["half"], models["none"], strict=True)]
-    assert all(k or now == "T#n7" for k, now in zip(kept, models["half"], strict=True))
+    # Choices outside the user's library are the same as before.
+    unchanged = [now == before for now, before in zip(models["half"], models["none"], strict=True)]
+    assert all(k or now == "T#n7" for k, now in zip(unchanged, models["half"], strict=True))
 
 
 def test_dressing_hands_the_recipe_s_share_on(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -218,7 +220,7 @@ def test_dressing_hands_the_recipe_s_share_on(monkeypatch: pytest.MonkeyPatch) -
         shares.append(mutable.own_share)
         return mutable.source, None
 
-    monkeypatch.setattr(dressing, "_dressed", seen)
+    monkeypatch.setattr(dressing, "dress_in_place", seen)
     fields = DressFields(library_share=0.3)
     dressing.dressed_house(house(_item("d", DRESSER, [2, 0, 1.1], 17)), EMPTY, fields, 1)
     assert shares == [0.3]
@@ -231,7 +233,7 @@ def _swapped_dresser(catalogue: Catalogue, own_share: float, seed: int) -> str:
     return mutable.items[0].source_class
 
 
-def test_a_thing_on_it_comes_to_stand_on_the_new_one() -> None:
+def test_contents_of_an_item_are_moved_onto_its_replacement() -> None:
     thing = solid("vase", [1.9, 0.8, 1.0], [2.1, 1.1, 1.2], 40)
     catalogue = _catalogue(("dresser", "new", (1.2, 0.5, 0.9)))
     mutable = _swapped(catalogue, _item("d", DRESSER, [2, 0, 1.1], 17), thing)
@@ -240,7 +242,7 @@ def test_a_thing_on_it_comes_to_stand_on_the_new_one() -> None:
     assert mutable.items[1].bounds[0, 1] == pytest.approx(top, abs=1e-4)
 
 
-def test_a_thing_inside_or_under_it_keeps_it() -> None:
+def test_an_item_with_others_inside_or_under_it_is_kept() -> None:
     thing = solid("box", [1.9, 0.3, 1.0], [2.1, 0.5, 1.2], 29)
     catalogue = _catalogue(("dresser", "new", DRESSER))
     mutable = _swapped(catalogue, _item("d", DRESSER, [2, 0, 1.1], 17), thing)
@@ -284,7 +286,7 @@ def test_a_lamp_that_is_lit_gets_no_model_without_a_light_source() -> None:
     assert mutable.refused["swap: no other model can be used"] == 1
 
 
-def test_the_share_says_how_many_and_the_seed_which() -> None:
+def test_the_share_gives_the_number_of_swaps_and_the_seed_their_choice() -> None:
     catalogue = _catalogue(("dresser", "new", DRESSER))
     items = [
         replace(_item(f"d{k}", DRESSER, [2.0 * k, 0, 1], 17), source_class=f"T#old{k}")
@@ -296,14 +298,14 @@ def test_the_share_says_how_many_and_the_seed_which() -> None:
     assert half == [i.source_class for i in _swapped(catalogue, *items, share=0.5).items]
 
 
-def test_a_model_that_cannot_be_used_leaves_the_old_one() -> None:
+def test_an_unusable_model_leaves_the_original() -> None:
     broken = replace(_catalogue(("dresser", "new", DRESSER)), load=lambda _piece: None)
     mutable = _swapped(broken, _item("d", DRESSER, [2, 0, 1], 17))
     assert mutable.items[0].source_class == "T#old"
     assert mutable.refused["swap: no other model can be used"] == 1
 
 
-def test_a_swapped_cabinet_stands_before_the_skirting_board_that_the_old_one_stood_in() -> None:
+def test_a_swapped_cabinet_is_in_front_of_the_skirting_board() -> None:
     place = OldPlace(0.0, np.array([0.0, 0.0, 0.0]), np.array([1.0, 2.0, 0.4]))
     along = np.array([[x, y, z] for x in (-1, 2) for y in (0, 0.07) for z in (-0.002, 0.012)])
     beside = np.array([[x, y, z] for x in (0.99, 1.002) for y in (0, 0.07) for z in (-1, 1)])
@@ -313,12 +315,12 @@ def test_a_swapped_cabinet_stands_before_the_skirting_board_that_the_old_one_sto
     assert before_boards(place, [beside]).low[2] == 0.0
 
 
-def test_what_opens_gives_way_to_what_opens_alone() -> None:
+def test_items_with_joints_are_swapped_only_for_items_with_joints() -> None:
     joint = Joint("drawer 1", JointKind.PRISMATIC, (0, 0, 0), (0, 0, 1), 0.3)
     old = replace(_item("chest", DRESSER, [2.0, 0.0, 1.0], 17), joints=(joint,))
     lump = _catalogue(("dresser", "lump", DRESSER))
     assert _swapped(lump, old).items[0].source_class == "T#old"
-    # Of the generated ones only those that open: the others may have none of its fronts.
+    # Only generated items with joints: the others may have none of its fronts.
     pieces = tuple(
         Piece(f"generated#{name}", name, "dresser", Place.FLOOR, 17, DRESSER)
         for name in ("opens", "shut")

@@ -1,4 +1,4 @@
-"""Smudges and brushed steel: how rough a surface is in the mean stays, what is matt stays as it was."""
+"""Smudges and brushed steel: mean roughness is kept, matt surfaces are unchanged."""
 
 from __future__ import annotations
 
@@ -52,11 +52,11 @@ def test_a_smooth_front_is_as_rough_as_before_in_the_mean(material: Material) ->
         replace(FRONT, kind=MaterialKind.MIRROR), replace(STEEL, name="chrome"),
     ],
 )  # fmt: skip
-def test_what_is_matt_a_mirror_or_chrome_stays(kept: Material) -> None:
+def test_matt_mirror_and_chrome_surfaces_are_unchanged(kept: Material) -> None:
     mutable = _worn(kept)
     assert mutable.items[0] is mutable.source.items[0]
 
 
-def test_small_things_stay_and_a_share_of_none_touches_nothing() -> None:
+def test_small_items_stay_and_a_share_of_zero_changes_nothing() -> None:
     for mutable in (_worn(FRONT, size=0.2), _worn(FRONT, share=0.0)):
         assert mutable.items[0] is mutable.source.items[0]

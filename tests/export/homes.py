@@ -1,4 +1,4 @@
-"""A repaired home in an output folder, and what two readings of one home must share."""
+"""A repaired home in an output folder, and the comparison of two readings of one home."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def repaired_home() -> House:
 
 
 def stored(folder: Path, house: House) -> Path:
-    """An output folder that holds the house."""
+    """An output folder with the house."""
     below = folder / "houses" / house.id
     below.mkdir(parents=True)
     for name, data in zip(("house.glb", "house.json"), bundle_from_house(house), strict=True):
@@ -33,33 +33,35 @@ def stored(folder: Path, house: House) -> Path:
 
 
 def differences(expected: House, got: House) -> list[str]:
-    """What of items, classes, boxes (a millimetre), rooms and lamps is not the same; by id."""
-    known = {item.id: item for item in got.items}
-    said = [f"more: {i}" for i in known if i not in {item.id for item in expected.items}]
+    """Differences of items, classes, boxes (a millimetre), rooms and lamps, by id."""
+    got_items = {item.id: item for item in got.items}
+    lines = [f"more: {i}" for i in got_items if i not in {item.id for item in expected.items}]
     for item in expected.items:
-        other = known.get(item.id)
-        if other is None:
-            said.append(f"missing: {item.id}")
+        got_item = got_items.get(item.id)
+        if got_item is None:
+            lines.append(f"missing: {item.id}")
             continue
-        facts = [(x.name, x.kind, x.nyu40, x.room_id) for x in (item, other)]
+        facts = [(x.name, x.kind, x.nyu40, x.room_id) for x in (item, got_item)]
         if facts[0] != facts[1]:
-            said.append(f"{item.id}: {facts}")
-        if item.surfaces and np.abs(item.bounds - other.bounds).max() > 1e-3:
-            said.append(f"{item.id}: bounds {item.bounds} {other.bounds}")
-        corners = item.oriented_box.corners[:, None] - other.oriented_box.corners[None]
+            lines.append(f"{item.id}: {facts}")
+        if item.surfaces and np.abs(item.bounds - got_item.bounds).max() > 1e-3:
+            lines.append(f"{item.id}: bounds {item.bounds} {got_item.bounds}")
+        corners = item.oriented_box.corners[:, None] - got_item.oriented_box.corners[None]
         off = np.linalg.norm(corners, axis=-1).min(1).max()
         if not item.kind.is_structure and item.surfaces and not off < 1e-3:
-            said.append(f"{item.id}: box off by {off}")
-    for room, other in zip(expected.rooms, got.rooms, strict=False):
-        same = (room.name, room.types) == (other.name, other.types)
-        heights = np.abs([room.floor_y - other.floor_y, room.ceiling_y - other.ceiling_y]).max()
-        outline = np.asarray(room.polygon), np.asarray(other.polygon)
+            lines.append(f"{item.id}: box off by {off}")
+    for room, got_item in zip(expected.rooms, got.rooms, strict=False):
+        same = (room.name, room.types) == (got_item.name, got_item.types)
+        heights = np.abs(
+            [room.floor_y - got_item.floor_y, room.ceiling_y - got_item.ceiling_y]
+        ).max()
+        outline = np.asarray(room.polygon), np.asarray(got_item.polygon)
         if not same or heights > 1e-3 or not _same_ring(*outline):
-            said.append(f"room {room}, {other}")
+            lines.append(f"room {room}, {got_item}")
     if len(expected.rooms) != len(got.rooms):
-        said.append(f"{len(got.rooms)} rooms")
-    said += _lamp_differences(expected, got)
-    return said
+        lines.append(f"{len(got.rooms)} rooms")
+    lines += _lamp_differences(expected, got)
+    return lines
 
 
 def _same_ring(a: np.ndarray, b: np.ndarray) -> bool:
@@ -74,15 +76,15 @@ def _lamp_differences(expected: House, got: House) -> list[str]:
     ]
     if lamps[0].keys() != lamps[1].keys():
         return [f"lamps {lamps[0].keys() ^ lamps[1].keys()}"]
-    said = []
-    for name, own in lamps[0].items():
-        other = lamps[1][name]
-        if len(own) != len(other):
-            said.append(f"{name}: {len(other)} lights")
-        for a, b in zip(own, other, strict=False):
+    lines = []
+    for name, expected_lamp in lamps[0].items():
+        got_lamp = lamps[1][name]
+        if len(expected_lamp) != len(got_lamp):
+            lines.append(f"{name}: {len(got_lamp)} lights")
+        for a, b in zip(expected_lamp, got_lamp, strict=False):
             same = np.allclose(a.rgb_linear, b.rgb_linear, atol=1e-3)
             if not same or abs(a.flux_lm / b.flux_lm - 1) > 1e-3:
-                said.append(f"{name}: {a} {b}")
+                lines.append(f"{name}: {a} {b}")
             if np.abs(a.position - b.position).max() > 1e-3:
-                said.append(f"{name}: at {b.position}, not {a.position}")
-    return said
+                lines.append(f"{name}: at {b.position}, not {a.position}")
+    return lines

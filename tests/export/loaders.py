@@ -1,6 +1,6 @@
-"""Loaders of the forms that training programs read, written from those programs' documentation alone.
+"""Loaders for the formats of training programs, written only from those programs' documentation.
 
-Nothing of the package is used here: what a loader gives is held against the stored layers.
+They use no code of the package: their results are compared with the stored layers.
 """
 
 from __future__ import annotations
@@ -19,36 +19,36 @@ from PIL import Image
 
 @dataclass
 class Example:
-    """What a loader gives of one sample."""
+    """One sample from a loader."""
 
-    name: str  # of its picture's file
+    name: str  # of its picture file
     rgb: np.ndarray  # (H, W, 3) uint8
     target: np.ndarray | tuple[np.ndarray, ...]
 
 
 def picture(file: Path) -> np.ndarray:
-    """A picture as its program opens it; what it must be is asserted by who calls."""
+    """A picture as its program opens it; the caller checks its type and size."""
     return np.asarray(Image.open(file))
 
 
 def pictures_of_yolo(yaml_file: Path, split: str) -> tuple[dict, list[Path]]:
-    """data.yaml and the pictures of a split: folders count from `path`, else from the file's own."""
+    """data.yaml and the pictures of a split: folders are relative to `path`, else to the file."""
     fields = yaml.safe_load(yaml_file.read_text())
     root = Path(fields.get("path", yaml_file.parent))
-    found = sorted((root / fields[split]).iterdir())
-    assert found
-    return fields, found
+    files = sorted((root / fields[split]).iterdir())
+    assert files
+    return fields, files
 
 
 def beside(file: Path, folder: str) -> Path:
-    """The file of the same place with its last component `images` replaced."""
+    """The file at the same place with the last path component `images` replaced."""
     parts = list(file.parts)
-    at = len(parts) - 1 - parts[::-1].index("images")
-    return Path(*parts[:at], folder, *parts[at + 1 :])
+    index = len(parts) - 1 - parts[::-1].index("images")
+    return Path(*parts[:index], folder, *parts[index + 1 :])
 
 
 def yolo_depth(yaml_file: Path, split: str) -> Iterator[Example]:
-    """Metres, 0 and below is invalid: PNG (2D uint16 over depth_scale), else NPY (2D floats)."""
+    """Depth in metres, with 0 and below invalid: PNG (2D uint16 over depth_scale), else NPY (2D floats)."""
     fields, files = pictures_of_yolo(yaml_file, split)
     assert fields["nc"] == 1
     assert fields["names"] == {0: "depth"}
@@ -66,7 +66,7 @@ def yolo_depth(yaml_file: Path, split: str) -> Iterator[Example]:
 
 
 def yolo_semantic(yaml_file: Path, split: str) -> Iterator[Example]:
-    """Names by pixel, "" where ignored: one channel of numbers of `names`, 255 = ignored."""
+    """Class name of each pixel, "" where ignored: one channel of indices of `names`, 255 = ignored."""
     fields, files = pictures_of_yolo(yaml_file, split)
     names = np.array([fields["names"].get(k, "unknown") for k in range(255)] + [""])
     for file in files:
@@ -77,7 +77,7 @@ def yolo_semantic(yaml_file: Path, split: str) -> Iterator[Example]:
 
 
 def marigold(folder: Path, list_file: str) -> Iterator[Example]:
-    """Depth in metres from 16-bit PNG of millimetres, or normals from NPY; a line a sample."""
+    """Depth in metres from 16-bit PNG of millimetres, or normals from NPY; one line per sample."""
     for line in (folder / list_file).read_text().splitlines():
         rgb_path, path = line.split()
         rgb = picture(folder / rgb_path)
@@ -91,7 +91,7 @@ def marigold(folder: Path, list_file: str) -> Iterator[Example]:
 
 
 def marigold_lighting(folder: Path, list_file: str) -> Iterator[Example]:
-    """Albedo, shading and residual, linear (H, W, 3), of NPY files that are no pickles."""
+    """Albedo, shading and residual, linear (H, W, 3), from NPY files without pickles."""
     for line in (folder / list_file).read_text().splitlines():
         rgb_path, *targets = line.split()
         assert [Path(p).name.split("_")[0] for p in targets] == ["albedo", "shading", "residual"]
@@ -101,7 +101,7 @@ def marigold_lighting(folder: Path, list_file: str) -> Iterator[Example]:
 
 
 def marigold_appearance(folder: Path, list_file: str) -> Iterator[Example]:
-    """Albedo sRGB, roughness and metallic of red and green, and where a mask of three channels counts."""
+    """Albedo in sRGB, roughness in red, metallic in green, and the validity mask of three channels."""
     for line in (folder / list_file).read_text().splitlines():
         rgb_path, albedo, material, mask = line.split()
         exr = OpenImageIO.ImageBuf(str(folder / material))
@@ -114,7 +114,7 @@ def marigold_appearance(folder: Path, list_file: str) -> Iterator[Example]:
 
 
 def horizonnet(folder: Path) -> Iterator[Example]:
-    """Corners (2 N, 2) in pixels of 1024 x 512: odd lines are the ceiling's, even ones the floor's.
+    """Corners (2 N, 2) in pixels of 1024 x 512: odd rows are on the ceiling, even ones on the floor.
 
     Longitude is ((x + 0.5) / W - 0.5) 2 pi, latitude downwards ((y + 0.5) / H - 0.5) pi.
     """
@@ -139,19 +139,19 @@ class HypersimFrame:
     row: pd.Series  # of the camera parameters
 
     def hdf5(self, folder: str, name: str) -> np.ndarray:
-        """The data set of a frame's file."""
+        """A data set of one of the frame's files."""
         file = f"images/scene_{self.camera}_{folder}/frame.{self.frame:04d}.{name}.hdf5"
         with h5py.File(self.scene / file, "r") as opened:
             assert list(opened) == ["dataset"]
             return opened["dataset"][:]
 
     def has(self, folder: str, name: str) -> bool:
-        """Whether it has a file."""
+        """Whether the frame has that file."""
         file = f"images/scene_{self.camera}_{folder}/frame.{self.frame:04d}.{name}"
         return (self.scene / file).is_file()
 
     def preview(self, name: str) -> np.ndarray:
-        """A lossy picture."""
+        """A lossy preview picture."""
         file = f"images/scene_{self.camera}_final_preview/frame.{self.frame:04d}.{name}.jpg"
         return picture(self.scene / file)
 
@@ -162,17 +162,17 @@ class HypersimFrame:
 
     @property
     def metres(self) -> float:
-        """Of an asset unit."""
+        """Length of an asset unit in metres."""
         table = pd.read_csv(self.scene / "_detail/metadata_scene.csv", index_col="parameter_name")
         return float(table.loc["meters_per_asset_unit"].iloc[0])
 
     @property
     def pose(self) -> np.ndarray:
         """(4, 4) world_from_camera, camera x right, y up, z backward."""
-        found = np.eye(4)
-        found[:3, :3] = self.detail(f"{self.camera}/camera_keyframe_orientations")[self.frame]
-        found[:3, 3] = self.detail(f"{self.camera}/camera_keyframe_positions")[self.frame]
-        return found
+        matrix = np.eye(4)
+        matrix[:3, :3] = self.detail(f"{self.camera}/camera_keyframe_orientations")[self.frame]
+        matrix[:3, 3] = self.detail(f"{self.camera}/camera_keyframe_positions")[self.frame]
+        return matrix
 
     def matrix(self, name: str, n: int) -> np.ndarray:
         """A matrix of the camera parameters."""
@@ -180,7 +180,7 @@ class HypersimFrame:
 
     @property
     def rays(self) -> np.ndarray:
-        """(H, W, 3) through the pixels' centres, camera axes: v counts upwards."""
+        """(H, W, 3) rays through the pixels' centres, camera axes: v counts upwards."""
         h, w = (int(self.row[f"settings_output_img_{x}"]) for x in ("height", "width"))
         u = (np.arange(w) + 0.5) / w * 2 - 1
         v = 1 - (np.arange(h) + 0.5) / h * 2
@@ -189,7 +189,7 @@ class HypersimFrame:
 
     @property
     def planar_depth(self) -> np.ndarray:
-        """(H, W) metres along the axis, NaN where nothing is."""
+        """(H, W) metres along the axis, NaN without a surface."""
         rays = self.rays
         return (
             -rays[..., 2]
@@ -198,7 +198,7 @@ class HypersimFrame:
         )
 
     def pixels_of(self, points: np.ndarray) -> np.ndarray:
-        """(N, 2) pixel coordinates of world points, from the corner of the picture: by M_proj."""
+        """(N, 2) pixel coordinates of world points by M_proj, from the corner of the picture."""
         h, w = (int(self.row[f"settings_output_img_{x}"]) for x in ("height", "width"))
         local = np.linalg.inv(self.pose) @ np.concatenate([points, np.ones((len(points), 1))], 1).T
         clip = self.matrix("M_proj", 4) @ local
@@ -221,7 +221,7 @@ def hypersim(root: Path) -> Iterator[HypersimFrame]:
 
 
 def ply_cloud(file: Path) -> pd.DataFrame:
-    """The vertices of a binary PLY, as its specification says."""
+    """The vertices of a binary PLY, read according to its specification."""
     kinds = {"float": "<f4", "uchar": "u1", "ushort": "<u2"}
     head, _, body = file.read_bytes().partition(b"end_header\n")
     words = [line.split() for line in head.decode().splitlines()]
@@ -233,7 +233,7 @@ def ply_cloud(file: Path) -> pd.DataFrame:
 
 
 def pcd_cloud(file: Path) -> tuple[pd.DataFrame, np.ndarray]:
-    """The points of a binary PCD 0.7, and (4, 4) its viewpoint: as PCL's page of the format says."""
+    """The points of a binary PCD 0.7, and its viewpoint (4, 4), according to PCL's page of the format."""
     head, _, body = file.read_bytes().partition(b"DATA binary\n")
     rows = [line.split() for line in head.decode().splitlines() if not line.startswith("#")]
     fields = {row[0]: row[1:] for row in rows}

@@ -52,7 +52,7 @@ def test_the_layout_is_complete(bop: Path) -> None:
 
 
 def test_a_posed_model_covers_its_mask(bop: Path) -> None:
-    """The model, posed and projected by what the files say alone, falls where the mask is."""
+    """The model, posed and projected only by the files' values, covers the mask."""
     scene = bop / "train_pbr/000000"
     poses, cameras = read(scene / "scene_gt.json"), read(scene / "scene_camera.json")
     facts = read(scene / "scene_gt_info.json")
@@ -65,25 +65,25 @@ def test_a_posed_model_covers_its_mask(bop: Path) -> None:
             pixels = pixels[:, :2] / pixels[:, 2:]
             name = f"{int(image):06d}_{number:06d}.png"
             mask = array_from_png((scene / "mask" / name).read_bytes()) > 0
-            seen = array_from_png((scene / "mask_visib" / name).read_bytes()) > 0
+            visible = array_from_png((scene / "mask_visib" / name).read_bytes()) > 0
             y, x = np.nonzero(mask)
             low, high = pixels.min(0), pixels.max(0)
             assert [x.min(), y.min()] == pytest.approx(np.maximum(low, 0), abs=1.0)
             assert [x.max(), y.max()] == pytest.approx(np.minimum(high, [95, 71]), abs=1.0)
-            said = facts[image][number]
-            assert said["px_count_all"] == mask.sum()
-            assert said["visib_fract"] == pytest.approx(seen.sum() / mask.sum())
-            assert (seen <= mask).all()
-            assert said["bbox_obj"][:2] == [x.min(), y.min()]
+            fact = facts[image][number]
+            assert fact["px_count_all"] == mask.sum()
+            assert fact["visib_fract"] == pytest.approx(visible.sum() / mask.sum())
+            assert (visible <= mask).all()
+            assert fact["bbox_obj"][:2] == [x.min(), y.min()]
 
 
 def test_depth_is_that_of_the_posed_model(bop: Path) -> None:
     scene = bop / "train_pbr/000000"
     depth = array_from_png((scene / "depth/000000.png").read_bytes())
     (row, *_others) = read(scene / "scene_gt.json")["0"]
-    seen = array_from_png((scene / "mask_visib/000000_000000.png").read_bytes()) > 0
+    visible = array_from_png((scene / "mask_visib/000000_000000.png").read_bytes()) > 0
     radius = 70.0  # half of the can's longest extent
-    assert np.abs(depth[seen] - row["cam_t_m2c"][2]).max() < radius
+    assert np.abs(depth[visible] - row["cam_t_m2c"][2]).max() < radius
 
 
 def test_coco_has_the_same_poses(bop: Path, tmp_path: Path) -> None:
@@ -96,7 +96,7 @@ def test_coco_has_the_same_poses(bop: Path, tmp_path: Path) -> None:
     assert mm == pytest.approx(row["cam_t_m2c"])
 
 
-def test_views_without_placed_models_are_told(tmp_path: Path) -> None:
+def test_views_without_placed_models_are_reported(tmp_path: Path) -> None:
     home = small_home()
     pf.render(home, home.cameras(n=1), modes=[]).save(tmp_path / "root")
     with pytest.raises(BadInput, match="no home of these views has a placed model"):

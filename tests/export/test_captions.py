@@ -1,4 +1,4 @@
-"""Captions say what the labels know: counts by hand, relations of boxes by hand, a real view."""
+"""Captions against hand-made answers: counts, relations of boxes, a real view."""
 
 import json
 from types import SimpleNamespace
@@ -20,8 +20,8 @@ from tests.scene.homes import small_home
 WORLD_FROM_CAMERA = np.diag([1.0, -1.0, -1.0, 1.0])
 
 
-def thing(number: int, noun: str, at=(0, 0, 3), size=(1, 1, 1), column=50, **fields) -> dict:
-    """An instance whose box stands at a place in camera axes."""
+def instance_row(number: int, noun: str, at=(0, 0, 3), size=(1, 1, 1), column=50, **fields) -> dict:
+    """An instance whose box is at a place in camera axes."""
     world = np.array(at) * [1, -1, -1]
     return {
         "id": number, "name": noun, "class": noun, "kind": "object", "nyu40": 1, "pixels": 1000 - number,
@@ -65,24 +65,24 @@ def test_nouns_have_plurals_and_articles(noun, many):
     assert counted(1, "armchair") == "an armchair"
 
 
-def test_a_thing_that_is_called_by_a_plural_is_some():
-    table = thing(1, "table", (0, 0, 3), (1, 0.8, 1))
-    plates = thing(2, "otherprop", (0, -0.45, 3), (0.2, 0.1, 0.2), name="Plates")
+def test_a_plural_name_takes_some():
+    table = instance_row(1, "table", (0, 0, 3), (1, 0.8, 1))
+    plates = instance_row(2, "otherprop", (0, -0.45, 3), (0.2, 0.1, 0.2), name="Plates")
     assert text(table, plates).endswith(
         "a table and some plates. The plates are on top of the table."
     )
     assert (plural("plates"), counted(2, "plates")) == ("plates", "some plates")
 
 
-def test_things_are_counted_and_named_by_what_they_are():
+def test_items_are_counted_and_named_by_class():
     rows = [
-        thing(1, "bed"), thing(2, "chair"), thing(3, "chair"), thing(4, "otherprop", name="Vase 3"),
-        thing(5, "otherprop", name="Обои"), thing(6, "otherprop", kind="plant"), thing(7, "none"),
-        thing(8, "wall", kind="wall"), thing(9, "sofa", visible_fraction=0.29),
-        thing(10, "sofa", fraction=0.0029), thing(11, "lamp", visible_fraction=None),
+        instance_row(1, "bed"), instance_row(2, "chair"), instance_row(3, "chair"), instance_row(4, "otherprop", name="Vase 3"),
+        instance_row(5, "otherprop", name="Обои"), instance_row(6, "otherprop", kind="plant"), instance_row(7, "none"),
+        instance_row(8, "wall", kind="wall"), instance_row(9, "sofa", visible_fraction=0.29),
+        instance_row(10, "sofa", fraction=0.0029), instance_row(11, "lamp", visible_fraction=None),
     ]  # fmt: skip
-    said = "a bed, two chairs, a vase, an object, a plant and a lamp."
-    assert text(*rows) == f"The picture shows a bedroom with {said}"
+    counts = "a bed, two chairs, a vase, an object, a plant and a lamp."
+    assert text(*rows) == f"The picture shows a bedroom with {counts}"
 
 
 @pytest.mark.parametrize(
@@ -92,25 +92,25 @@ def test_things_are_counted_and_named_by_what_they_are():
         ("Zxqv", 'a room called "Zxqv"'), ("Studio", "a study"),
     ],
 )  # fmt: skip
-def test_a_room_is_what_its_name_means(room, said):
+def test_the_name_of_a_room_gives_its_kind(room, said):
     assert text(room=room) == f"The picture shows {said}."
 
 
 def square(x: float, z: float, floor_y: float = -1.0) -> RoomOutline:
-    """A room of 4 x 4 m whose least corner is there."""
+    """A room of 4 x 4 m with this least corner."""
     return RoomOutline(np.array([[x, z], [x + 4, z], [x + 4, z + 4], [x, z + 4]]), floor_y)
 
 
 @pytest.mark.parametrize(
     ("left_m", "right_m", "said"),
     [
-        (3.0, 3.0, "a hall"),  # the walls of the room that it stands in
-        (6.5, 3.0, "a kitchen"),  # 60 of 100 columns see through a doorway
-        (0.0, 3.0, "a hall"),  # nothing does not count
-        (60.0, 60.0, "a hall"),  # all lies outside
+        (3.0, 3.0, "a hall"),  # the walls of the eye's room
+        (6.5, 3.0, "a kitchen"),  # 60 of 100 columns show the next room through a doorway
+        (0.0, 3.0, "a hall"),  # pixels without a surface do not count
+        (60.0, 60.0, "a hall"),  # all of it is outdoors
     ],
 )
-def test_a_room_is_the_one_that_is_seen(left_m, right_m, said):
+def test_the_caption_names_the_visible_room(left_m, right_m, said):
     # The eye looks along -z from the origin; the kitchen is the next room there.
     rooms = {"0_0": "Hall", "0_1": "Kitchen", "1_0": "Attic"}
     places = {"0_0": square(-2, -3), "0_1": square(-4, -7.1), "1_0": square(-4, -7.1, 2)}
@@ -123,7 +123,7 @@ def test_a_room_is_the_one_that_is_seen(left_m, right_m, said):
 
 
 def test_a_study_with_a_bed_is_a_studio():
-    assert text(thing(1, "bed"), room="Studio") == "The picture shows a studio with a bed."
+    assert text(instance_row(1, "bed"), room="Studio") == "The picture shows a studio with a bed."
 
 
 @pytest.mark.parametrize(
@@ -135,41 +135,50 @@ def test_a_study_with_a_bed_is_a_studio():
         ((0.2, 0, 5), (1, 1, 1), 50, "behind"),
         ((0.2, 0, 1.5), (1, 1, 1), 50, "in front of"),
         ((0.2, -0.6, 3), (0.2, 0.2, 0.2), 50, "on top of"),  # y is down
-        ((0.2, -0.8, 3), (0.2, 0.2, 0.2), 50, ""),  # 20 cm above it
-        ((0.2, 0.2, 3.2), (1, 1, 1), 50, ""),  # in one another
+        ((0.2, -0.8, 3), (0.2, 0.2, 0.2), 50, ""),  # a gap of 20 cm
+        ((0.2, 0.2, 3.2), (1, 1, 1), 50, ""),  # one inside the other
     ],
 )
 def test_relations_are_those_of_the_boxes(at, size, column, relation):
-    told = caption(view_of(thing(1, "table"), thing(2, "bowl", at, size, column)))["relations"]
-    assert told == ([{"subject": 2, "relation": relation, "object": 1}] if relation else [])
+    relations = caption(
+        view_of(instance_row(1, "table"), instance_row(2, "bowl", at, size, column))
+    )["relations"]
+    assert relations == ([{"subject": 2, "relation": relation, "object": 1}] if relation else [])
 
 
-def test_the_larger_thing_may_stand_on_the_smaller():
-    rows = thing(1, "lamp", (0, -1, 3)), thing(2, "table")
+def test_the_larger_item_may_be_on_the_smaller():
+    rows = instance_row(1, "lamp", (0, -1, 3)), instance_row(2, "table")
     assert text(*rows).endswith("a lamp and a table. The lamp is on top of the table.")
 
 
-def test_things_of_one_noun_are_told_apart_from_left_to_right():
-    pair = [thing(1, "table"), thing(2, "chair", (2, 0, 3), column=90)]
-    pair.append(thing(3, "chair", (-2, 0, 3), column=10))
-    said = (
+def test_items_of_one_noun_are_distinguished_from_left_to_right():
+    pair = [instance_row(1, "table"), instance_row(2, "chair", (2, 0, 3), column=90)]
+    pair.append(instance_row(3, "chair", (-2, 0, 3), column=10))
+    expected = (
         "The right chair is to the right of the table. The left chair is to the left of the table."
     )
-    assert text(*pair).endswith(said)
-    pair.append(thing(4, "chair", (0, 0, 9), column=50))
+    assert text(*pair).endswith(expected)
+    pair.append(instance_row(4, "chair", (0, 0, 9), column=50))
     assert "The second chair from the left is behind the table." in text(*pair)
 
 
-def test_a_panorama_tells_only_what_stands_on_what():
-    rows = thing(1, "table"), thing(2, "bowl", (2, 0, 3), column=90), thing(3, "vase", (0, -1, 3))
+def test_a_panorama_lists_only_supports():
+    rows = (
+        instance_row(1, "table"),
+        instance_row(2, "bowl", (2, 0, 3), column=90),
+        instance_row(3, "vase", (0, -1, 3)),
+    )
     facts = {"lens": {"model": "equirect"}, "depth": "distance"}
-    told = caption(view_of(*rows, **facts))["relations"]
-    assert [row["relation"] for row in told] == ["on top of"]
+    relations = caption(view_of(*rows, **facts))["relations"]
+    assert [row["relation"] for row in relations] == ["on top of"]
 
 
 def test_the_users_classes_are_the_nouns():
     classes = ClassMap((ClassRule("chair", 1, "seat"), ClassRule("bed", 0, "")))
-    rows = thing(1, "chair", own_class_name="seat"), thing(2, "bed", own_class_name="")
+    rows = (
+        instance_row(1, "chair", own_class_name="seat"),
+        instance_row(2, "bed", own_class_name=""),
+    )
     assert text(*rows, classes=classes) == "The picture shows a bedroom with a seat."
 
 
@@ -185,7 +194,7 @@ def test_an_export_has_a_line_a_view_and_its_picture(tmp_path):
         assert line["text"].startswith(
             ("The picture shows a living room", "The picture shows a bed")
         )
-        known = {row["id"] for row in line["objects"]}
-        assert all({row["subject"], row["object"]} <= known for row in line["relations"])
+        ids = {row["id"] for row in line["objects"]}
+        assert all({row["subject"], row["object"]} <= ids for row in line["relations"])
     export(tmp_path / "root", tmp_path / "again", "captions")
     assert (tmp_path / "again/captions.jsonl").read_text("utf-8").splitlines() == lines

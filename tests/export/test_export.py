@@ -21,14 +21,14 @@ from tests.check.roots import SIZE, make_root
 
 
 def mask_from_run_lengths(runs: dict[str, list[int]]) -> np.ndarray:
-    """The mask (H, W) of COCO's uncompressed run lengths, read as its documentation says."""
+    """The mask (H, W) of COCO's uncompressed run lengths, read according to its documentation."""
     height, width = runs["size"]
     values = np.arange(len(runs["counts"])) % 2 == 1  # runs alternate, zeros first
     return np.repeat(values, runs["counts"]).reshape(width, height).T
 
 
 def uncompressed(runs: dict) -> dict[str, list[int]]:
-    """COCO's compressed run lengths as plain ones, read as its maskApi.c says."""
+    """COCO's compressed run lengths as plain ones, read like its maskApi.c."""
     counts: list[int] = []
     value = shift = 0
     for code in (ord(c) - 48 for c in runs["counts"]):
@@ -107,7 +107,7 @@ def test_compressed_run_lengths_are_cocos_text():
     # By hand: counts 0, 1, 3 are characters 48 + n; 100 = 3 * 32 + 4 takes two.
     assert compressed_runs(np.array([[True, False], [False, False]]))["counts"] == "013"
     assert compressed_runs(np.zeros((10, 10), bool))["counts"] == chr(48 + 4 + 32) + chr(48 + 3)
-    # The fourth count is 2 - 3 = -1 above the last but one: 31 with a sign.
+    # The fourth count is stored as 2 - 3 = -1 relative to the last but one: 31 with a sign.
     mask = np.array([0, 0, 1, 1, 1, 0, 1, 1], bool)[:, None]
     assert run_lengths(mask)["counts"] == [2, 3, 1, 2]
     assert compressed_runs(mask)["counts"] == "231" + chr(48 + 31)
@@ -153,7 +153,7 @@ def test_yolo_boxes_are_those_of_the_instances(root, tmp_path):
     assert "\n  4: chair\n" in (tmp_path / "yolo/data.yaml").read_text()
 
 
-def test_data_yaml_works_from_any_directory_and_says_what_stands_for_val(root, tmp_path):
+def test_data_yaml_works_from_any_directory_and_names_the_replacement_of_val(root, tmp_path):
     export(root, tmp_path / "all", "yolo")
     export(root, tmp_path / "one", "yolo-seg", shares=SplitShares(1, 0, 0))
     export(root, tmp_path / "test", "yolo", shares=SplitShares(0, 0, 1))
@@ -184,7 +184,7 @@ def test_yolo_polygons_cover_the_visible_masks(root, tmp_path):
 
 
 def filled(ring: np.ndarray, shape: tuple[int, ...]) -> np.ndarray:
-    """The pixels whose centres a ring goes around an odd number of times."""
+    """Pixels whose centres are inside a ring by the even-odd rule."""
     y, x = np.mgrid[: shape[0], : shape[1]] + 0.5
     inside = np.zeros(shape, bool)
     for (x0, y0), (x1, y1) in zip(ring, np.roll(ring, -1, 0), strict=True):
@@ -204,21 +204,21 @@ def test_a_polygon_a_part_with_its_holes_within_a_pixel():
     outline = mask ^ binary_erosion(mask) | binary_dilation(mask) ^ mask
     assert not (rebuilt ^ mask)[~outline].any()
     assert (rebuilt & mask).sum() / (rebuilt | mask).sum() > 0.97
-    # A pixel's steps are gone, corners stay.
+    # Steps of single pixels are smoothed, corners stay.
     assert len(rings[0]) < 150
     assert sorted(map(tuple, rings[1])) == [(90, 5), (90, 9), (95, 5), (95, 9)]
 
 
 @pytest.fixture
-def own(tmp_path: Path) -> Choice:
+def own_classes(tmp_path: Path) -> Choice:
     (tmp_path / "own.csv").write_text(
         "from,id,name\nwall,300,shell\nfloor,300,shell\nbed,7,rest\n*,12,'other: thing'\n"
     )
     return Choice(classes=class_map(tmp_path / "own.csv"))
 
 
-def test_coco_has_the_users_own_classes(root, tmp_path, own):
-    export(root, tmp_path / "coco", "coco", choice=own)
+def test_coco_has_the_users_classes(root, tmp_path, own_classes):
+    export(root, tmp_path / "coco", "coco", choice=own_classes)
     document = json.loads((tmp_path / "coco/annotations.json").read_text())
     kinds = {c["id"]: (c["name"], c["supercategory"]) for c in document["categories"]}
     assert kinds[300] == ("shell", "structure")
@@ -233,8 +233,8 @@ def test_coco_has_the_users_own_classes(root, tmp_path, own):
     assert used == {a["category_id"] for a in document["annotations"]}
 
 
-def test_yolo_counts_the_users_classes_from_0_and_boxes_all(root, tmp_path, own):
-    export(root, tmp_path / "yolo", "yolo", choice=own)
+def test_yolo_counts_the_users_classes_from_0_and_boxes_all(root, tmp_path, own_classes):
+    export(root, tmp_path / "yolo", "yolo", choice=own_classes)
     names = (tmp_path / "yolo/data.yaml").read_text().partition("names:\n")[2]
     assert names == '  0: "rest"\n  1: "\'other: thing\'"\n  2: "shell"\n'
     lines = next((tmp_path / "yolo/labels").glob("*__v0.txt")).read_text().splitlines()
@@ -244,8 +244,8 @@ def test_yolo_counts_the_users_classes_from_0_and_boxes_all(root, tmp_path, own)
     assert [int(line.split()[0]) for line in lines] == numbers
 
 
-def test_polygons_have_the_numbers_of_the_users_classes(root, tmp_path, own):
-    export(root, tmp_path / "seg", "yolo-seg", choice=own)
+def test_polygons_have_the_numbers_of_the_users_classes(root, tmp_path, own_classes):
+    export(root, tmp_path / "seg", "yolo-seg", choice=own_classes)
     assert '  0: "rest"\n' in (tmp_path / "seg/data.yaml").read_text()
     lines = next((tmp_path / "seg/labels").glob("*__v0.txt")).read_text().splitlines()
     rows = json.loads((view_folder(root) / "view.json").read_text())["instances"]
@@ -255,8 +255,8 @@ def test_polygons_have_the_numbers_of_the_users_classes(root, tmp_path, own):
 
 
 @pytest.mark.parametrize("size", [None, (64, 48)])
-def test_category_maps_hold_the_users_classes(root, tmp_path, own, size):
-    choice = replace(own, size=size)
+def test_category_maps_hold_the_users_classes(root, tmp_path, own_classes, size):
+    choice = replace(own_classes, size=size)
     export(root, tmp_path / "web", "webdataset", choice=choice)
     export(root, tmp_path / "h5", "hdf5", choice=choice)
     with tarfile.open(tmp_path / "web/shard-000000.tar") as tar:
@@ -274,12 +274,12 @@ def test_category_maps_hold_the_users_classes(root, tmp_path, own, size):
     assert {a["category_id"] for a in attributes} == set(np.unique(label)) - {0}
 
 
-def test_a_form_without_classes_refuses_those_of_the_user(root, tmp_path, own):
+def test_a_form_without_classes_refuses_those_of_the_user(root, tmp_path, own_classes):
     with pytest.raises(BadInput, match="classes: released has fixed classes"):
-        export(root, tmp_path / "x", "released", choice=own)
+        export(root, tmp_path / "x", "released", choice=own_classes)
 
 
-def test_the_verb_reads_the_table(root, tmp_path, own, capsys):
+def test_the_verb_reads_the_table(root, tmp_path, own_classes, capsys):
     words = ["export", str(root), "--to", "yolo", "--classes"]
     assert main([*words, str(tmp_path / "own.csv"), "--out", str(tmp_path / "y")]) == 0
     assert "rest" in (tmp_path / "y/data.yaml").read_text()
@@ -292,8 +292,8 @@ def test_at_another_size_labels_boxes_and_k_agree(root, tmp_path):
     choice = Choice(size=(64, 48))
     export(root, tmp_path / "small", "webdataset", choice=choice)
     with tarfile.open(tmp_path / "small/shard-000000.tar") as tar:
-        own = [m for m in tar if "__v0." in m.name]
-        data = {m.name.partition(".")[2]: tar.extractfile(m).read() for m in own}
+        members = [m for m in tar if "__v0." in m.name]
+        data = {m.name.partition(".")[2]: tar.extractfile(m).read() for m in members}
     facts, large = (
         json.loads(data["json"]),
         json.loads((view_folder(root) / "view.json").read_text()),
@@ -337,7 +337,7 @@ def test_only_chosen_layers_and_modes_are_exported_and_radiance_when_named(root,
         assert set(file) == {"depth", "instance_attribute_maps", "campose"}
 
 
-def test_a_split_is_a_folder_of_its_own_for_each_form(root, tmp_path):
+def test_a_split_is_a_separate_folder_in_each_form(root, tmp_path):
     house = view_folder(root).parent.parent.name
     shares = SplitShares(1, 0, 0)
     assert split_of_house(house, shares) == "train"
@@ -358,7 +358,7 @@ def test_a_split_is_a_folder_of_its_own_for_each_form(root, tmp_path):
         ({"layers": ("radiance",), "size": (8, 6)}, "radiance.exr is not resized"),
     ],
 )
-def test_a_choice_that_cannot_be_is_told(fields, match):
+def test_an_impossible_choice_is_refused(fields, match):
     with pytest.raises(BadInput, match=match):
         Choice(**fields)
 
@@ -376,7 +376,7 @@ def test_hdf5_has_blenderprocs_keys_and_conventions(root, tmp_path):
         attributes = json.loads(file["instance_attribute_maps"][()])
         camera = json.loads(file["campose"][()])
         pose = np.array(camera["cam2world_matrix"])
-    # BlenderProc counts pixels from the centre of the first.
+    # BlenderProc's pixel coordinates start at the centre of the first pixel.
     assert camera["cam_K"][0][2] == (SIZE[0] - 1) / 2
     assert camera["cam_K"][1][2] == (SIZE[1] - 1) / 2
     by_id = {a["idx"]: a["category_id"] for a in attributes}
@@ -425,7 +425,7 @@ def test_the_released_layout_has_the_published_names_and_cameras(root, tmp_path)
     assert half == pytest.approx([0.5534, np.arctan(0.75 * np.tan(0.5534))], abs=1e-5)
 
 
-def test_only_what_a_selection_keeps_is_exported(root, tmp_path):
+def test_only_selected_views_are_exported(root, tmp_path):
     house = view_folder(root).parent.parent.name
     (root / "selection").mkdir(exist_ok=True)
     rows = [{"house": house, "view": f"v{k}", "kept": k == 1} for k in range(2)]
@@ -435,7 +435,7 @@ def test_only_what_a_selection_keeps_is_exported(root, tmp_path):
         export(root, tmp_path / "y", "coco", selection="other")
 
 
-def test_a_wrong_form_a_full_folder_and_an_empty_root_are_told(root, tmp_path):
+def test_a_wrong_form_a_full_folder_and_an_empty_root_are_refused(root, tmp_path):
     with pytest.raises(BadInput, match="bop, captions, coco, colmap"):
         export(root, tmp_path / "x", "stl")
     (tmp_path / "full").mkdir()

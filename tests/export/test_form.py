@@ -1,4 +1,4 @@
-"""The table of forms: one file a form, and nothing else lists them."""
+"""The table of forms: one file per form, and no other list."""
 
 from __future__ import annotations
 
@@ -44,7 +44,7 @@ def test_the_docs_have_the_table(of: str) -> None:
     assert forms_table(of) in PAGES[of].read_text()
 
 
-def test_the_docs_say_how_each_form_of_views_counts_pixels() -> None:
+def test_the_docs_state_the_pixel_convention_of_each_form() -> None:
     table = conventions_table()
     assert table in PAGES["views"].read_text()
     views = [name for name in form_names() if form_of(name).of == "views"]
@@ -90,7 +90,7 @@ FORM = ViewForm(
 
 @pytest.fixture
 def mine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """A form of one's own, with options, as one file among the forms."""
+    """A user's form with options, as one file among the forms."""
     folder = tmp_path / "forms"
     folder.mkdir()
     (folder / "my_lines.py").write_text(MINE)
@@ -102,7 +102,7 @@ def mine(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
 def test_a_file_is_all_that_a_new_form_takes(
     root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    # It is offered, written with classes of one's own, named where another form has none, and documented.
+    # It is offered, written with custom classes, named where another form has none, and documented.
     assert (
         build_parser("labelling").parse_args(["export", "r", "--to", "my-lines"]).to == "my-lines"
     )

@@ -1,4 +1,4 @@
-"""A home as one GLB: what is written is read back equal."""
+"""A home as one GLB reads back equal."""
 
 from __future__ import annotations
 
@@ -80,7 +80,7 @@ def test_names_of_pieces_are_unique_and_fit_every_file_system() -> None:
     assert all(n.isascii() and n.replace("_", "").isalnum() and n[0].isalpha() for n in names)
 
 
-def test_what_lies_before_the_windows_is_no_part_of_an_exported_home() -> None:
+def test_outdoor_surroundings_are_not_exported() -> None:
     house = repaired_home()
     street = replace(house.items[0], id="outside_street", kind=ItemKind.GROUND, tags=(OUTSIDE,))
     with_street = house.with_items([*house.items, street])
@@ -88,13 +88,13 @@ def test_what_lies_before_the_windows_is_no_part_of_an_exported_home() -> None:
 
 
 @pytest.mark.long
-def test_things_have_parts_to_collide_with_and_the_floor_between_them_is_walkable() -> None:
+def test_items_have_collision_parts_and_the_floor_between_them_is_walkable() -> None:
     home = exported_home(repaired_home())
     for piece in home.things:
         parts = np.concatenate(piece.colliders)
         low, high = -piece.size / 2, piece.size / 2
         low[1], high[1] = 0, piece.size[1]
-        # The parts fill the box and keep within it.
+        # The parts fill the box and stay inside it.
         assert (parts.min(0) > low - 0.02).all()
         assert (parts.max(0) < high + 0.02).all()
         assert (parts.max(0) - parts.min(0) > 0.9 * piece.size - 0.02).all()
@@ -102,7 +102,7 @@ def test_things_have_parts_to_collide_with_and_the_floor_between_them_is_walkabl
     assert all(home.navigable[room.id] for room in home.house.rooms)
 
 
-def test_a_folder_without_a_home_and_options_of_views_are_one_line(
+def test_a_folder_without_a_home_and_options_of_views_are_refused(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     with pytest.raises(BadInput, match=r"has no house.glb"):

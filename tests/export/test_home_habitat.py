@@ -1,4 +1,4 @@
-"""A home as a Habitat data set: what is written is read back equal."""
+"""A home as a Habitat data set reads back equal."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ def test_a_home_reads_back_equal_from_its_data_set(tmp_path: Path) -> None:
     source = resolve(str(path))
     got = read_house(source, ReadFields())
     assert got.id == source.house_id, "the home can be run"
-    said = [d for d in differences(house, got) if not d.startswith("room ")]
-    assert said == []
+    differing = [d for d in differences(house, got) if not d.startswith("room ")]
+    assert differing == []
     assert [(r.name, len(r.polygon)) for r in got.rooms] == [
         (r.name, len(r.polygon)) for r in house.rooms
     ]
@@ -36,11 +36,11 @@ def test_a_home_reads_back_equal_from_its_data_set(tmp_path: Path) -> None:
         assert (config.parent / json.loads(config.read_text())["collision_asset"]).is_file()
 
 
-def test_what_opens_reads_back_with_its_joints(tmp_path: Path) -> None:
+def test_opening_parts_read_back_with_their_joints(tmp_path: Path) -> None:
     house = repaired_home()
     doors = {item.id: item for item in house.items if item.joints}
     assert doors
-    # One of them stands open.
+    # One of them is open.
     item = next(iter(doors.values()))
     joint = item.joints[0]
     surfaces = tuple(
@@ -55,15 +55,17 @@ def test_what_opens_reads_back_with_its_joints(tmp_path: Path) -> None:
     assert len(rows) == len(doors)
     got = {i.id: i for i in read_house(resolve(str(path)), ReadFields()).items if i.joints}
     assert got.keys() == doors.keys()
-    for key, own in (doors | {item.id: opened}).items():
-        for a, b in zip(own.joints, got[key].joints, strict=True):
+    for key, opening_item in (doors | {item.id: opened}).items():
+        for a, b in zip(opening_item.joints, got[key].joints, strict=True):
             assert a.kind is b.kind
             assert b.point == pytest.approx(a.point, abs=1e-5)
             assert b.axis == pytest.approx(a.axis, abs=1e-5)
             assert (b.lower, b.upper, b.value) == pytest.approx(
                 (a.lower, a.upper, a.value), abs=1e-6
             )
-            before = np.concatenate([s.positions for s in own.surfaces if s.part == a.part])
+            before = np.concatenate(
+                [s.positions for s in opening_item.surfaces if s.part == a.part]
+            )
             after = np.concatenate([s.positions for s in got[key].surfaces if s.part == b.part])
             assert after.min(0) == pytest.approx(before.min(0), abs=1e-4)
             assert after.max(0) == pytest.approx(before.max(0), abs=1e-4)

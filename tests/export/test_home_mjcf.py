@@ -1,4 +1,4 @@
-"""A home as a model of MuJoCo: it loads, rests, and its drawers and doors travel as their joints say."""
+"""A home as a MuJoCo model loads, rests, and its drawers and doors move by their joints."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ def model_of(house: House, folder: Path) -> Any:
 
 def corners(model: Any, state: Any, body: str) -> np.ndarray:
     """Bounds in the world, y up, of a body's visual vertices."""
-    found = []
+    vertices = []
     for k in range(model.ngeom):
         if model.body(model.geom_bodyid[k]).name == body and model.geom_group[k] == 2:
             mesh = model.geom_dataid[k]
             first, n = model.mesh_vertadr[mesh], model.mesh_vertnum[mesh]
             points = model.mesh_vert[first : first + n] @ state.geom_xmat[k].reshape(3, 3).T
-            found.append(points + state.geom_xpos[k])
-    x, y, z = np.concatenate(found).T
+            vertices.append(points + state.geom_xpos[k])
+    x, y, z = np.concatenate(vertices).T
     points = np.stack([x, z, -y], -1)
     return np.array([points.min(0), points.max(0)])
 
@@ -67,10 +67,8 @@ def push(model: Any, name: str, by: float, seconds: float = 3.0) -> float:
     return float(state.qpos[joint.qposadr[0]])
 
 
-def test_a_drawer_runs_between_fronts_that_touch_it_and_meets_a_thing_before_it(
-    tmp_path: Path,
-) -> None:
-    # The neighbour's front is 3 mm away, less than what hulls keep apart.
+def test_a_drawer_runs_between_touching_fronts_and_hits_an_item_before_it(tmp_path: Path) -> None:
+    # The neighbour's front is 3 mm away, less than the hulls' margin.
     drawers = cupboard(JointKind.PRISMATIC), cupboard(JointKind.PRISMATIC, WIDE, "neighbour")
     model = model_of(small_home(*drawers), tmp_path / "free")
     assert push(model, "cupboard.front", 20.0) == pytest.approx(0.4, abs=0.01)
@@ -79,7 +77,7 @@ def test_a_drawer_runs_between_fronts_that_touch_it_and_meets_a_thing_before_it(
     assert push(model, "cupboard.front", 20.0) == pytest.approx(0.2, abs=0.01)
 
 
-def test_loose_things_are_at_rest_and_what_hovers_has_sunk(tmp_path: Path) -> None:
+def test_loose_items_are_at_rest_and_hovering_ones_have_sunk(tmp_path: Path) -> None:
     house = small_home(
         loose("block", (0, 0.02, 0), (0.2, 0.22, 0.2)), loose("mug", (1, 0, 1), (1.08, 0.1, 1.08))
     )
@@ -95,8 +93,8 @@ def test_loose_things_are_at_rest_and_what_hovers_has_sunk(tmp_path: Path) -> No
     assert model.body("mug").dofnum[0] == 6
 
 
-def test_what_stands_in_each_other_is_parted_and_lies_still(tmp_path: Path) -> None:
-    # By 30 mm, as a chair's legs in a table's: left alone, they would be thrown apart.
+def test_overlapping_items_are_separated_and_at_rest(tmp_path: Path) -> None:
+    # By 30 mm, like a chair's legs among a table's: unseparated, they would be thrown apart.
     table, chair = (
         loose("table", (0, 0, 0), (1, 0.7, 1)), loose("chair", (0.97, 0, 0.2), (1.4, 0.9, 0.6))
     )  # fmt: skip
@@ -122,7 +120,7 @@ def test_the_built_in_home_loads_with_its_textures_and_free_bodies(tmp_path: Pat
     assert (model.body_mass[model.jnt_bodyid] > 0).all()
 
 
-def test_a_part_that_weighs_says_so(tmp_path: Path) -> None:
+def test_a_part_with_mass_states_it(tmp_path: Path) -> None:
     item = cupboard(JointKind.REVOLUTE)
     heavy = replace(item, joints=(Joint(**{**_fields(item.joints[0]), "mass_kg": 7.5}),))
     model = model_of(small_home(heavy), tmp_path)

@@ -1,4 +1,4 @@
-"""A home as a world of Gazebo: models where the items are, with meshes, masses, lamps."""
+"""A home as a Gazebo world: models at the items' places, with meshes, masses, lamps."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ _HOME = exported_home(repaired_home())
 
 
 def turned(piece: Piece) -> Piece:
-    """The piece about a slanting axis, so that no sign or order of axes can hide."""
+    """The piece turned about a slanting axis, which exposes any wrong sign or order of axes."""
     frame = np.eye(4)
     frame[:3, :3] = Rotation.from_rotvec([0.3, 0.9, -0.5]).as_matrix()
     frame[:3, 3] = [1.0, 2.0, -3.0]
@@ -55,14 +55,14 @@ def numbers(element: ET.Element, path: str) -> list[float]:
 
 def pose(element: ET.Element) -> np.ndarray:
     """The matrix of an element's pose, a unit matrix without one."""
-    found = np.eye(4)
-    told = element.find("pose")
-    if told is not None:
-        assert told.get("rotation_format") == "quat_xyzw"
+    matrix = np.eye(4)
+    pose_element = element.find("pose")
+    if pose_element is not None:
+        assert pose_element.get("rotation_format") == "quat_xyzw"
         values = numbers(element, "pose")
-        found[:3, 3] = values[:3]
-        found[:3, :3] = Rotation.from_quat(values[3:]).as_matrix()
-    return found
+        matrix[:3, 3] = values[:3]
+        matrix[:3, :3] = Rotation.from_quat(values[3:]).as_matrix()
+    return matrix
 
 
 def placed(matrix: np.ndarray, points: np.ndarray) -> np.ndarray:
@@ -75,20 +75,18 @@ def z_up(points: np.ndarray) -> np.ndarray:
 
 
 def bounds_of_glb(path: Path) -> np.ndarray:
-    """Of its vertices, where no node moves them."""
+    """Bounds of its vertices in the file; no node may move them."""
     document = gltf_from_glb(path.read_bytes(), path.name).document
     assert not any(
         {"matrix", "translation", "rotation"} & node.keys() for node in document["nodes"]
     )
-    told = [row for row in document["accessors"] if "min" in row]
+    accessors = [row for row in document["accessors"] if "min" in row]
     return np.array(
-        [np.min([row["min"] for row in told], 0), np.max([row["max"] for row in told], 0)]
+        [np.min([row["min"] for row in accessors], 0), np.max([row["max"] for row in accessors], 0)]
     )
 
 
-def test_the_verb_writes_a_world_whose_models_are_the_building_and_the_things(
-    tmp_path: Path,
-) -> None:
+def test_the_verb_writes_a_world_with_models_of_the_building_and_the_items(tmp_path: Path) -> None:
     root = stored(tmp_path / "root", repaired_home())
     assert main(["export", str(root), "--to", "sdf", "--out", str(tmp_path / "out")]) == 0
     (path,) = (tmp_path / "out").glob("*/*.sdf")
@@ -110,7 +108,7 @@ def test_the_verb_writes_a_world_whose_models_are_the_building_and_the_things(
     assert {m.findtext("static") for m in models.values()} == {"true", "false"}
 
 
-def test_every_link_has_what_it_needs_and_every_mesh_exists(written: Path) -> None:
+def test_every_link_is_complete_and_every_mesh_exists(written: Path) -> None:
     pieces = {piece.name: piece for piece in _HOME.things}
     for model in world_of(written).findall("model"):
         links = model.findall("link")
@@ -136,7 +134,7 @@ def test_every_link_has_what_it_needs_and_every_mesh_exists(written: Path) -> No
     assert uris == {f"meshes/{p.name}" for p in (written.parent / "meshes").iterdir()}
 
 
-def test_poses_put_the_vertices_of_a_mesh_where_the_item_has_them(tmp_path: Path) -> None:
+def test_poses_put_the_vertices_of_a_mesh_at_the_items_places(tmp_path: Path) -> None:
     things = tuple(turned(piece) for piece in _HOME.things if len(piece.bodies) == 1)[:4]
     home = ExportedHome(_HOME.house, (*_HOME.building[:1], *things))
     write_sdf(home, tmp_path)
@@ -161,11 +159,11 @@ def test_poses_put_the_vertices_of_a_mesh_where_the_item_has_them(tmp_path: Path
         assert np.allclose(placed(pose(model), np.array(centre)), z_up(middle), atol=1e-5)
         turn = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])
         moments = np.diag(turn @ np.diag(piece.inertia) @ turn.T)
-        told = [numbers(link, f"inertial/inertia/{k}")[0] for k in ("ixx", "iyy", "izz")]
-        assert np.allclose(told, moments)
+        inertia = [numbers(link, f"inertial/inertia/{k}")[0] for k in ("ixx", "iyy", "izz")]
+        assert np.allclose(inertia, moments)
 
 
-def test_the_building_stands_where_it_is(written: Path) -> None:
+def test_the_building_is_in_place(written: Path) -> None:
     model = world_of(written).findall("model")[0]
     corners = np.array([[1.0, 2.0, 3.0], [0.0, 1.0, 0.0]])
     for tag in ("visual", "collision"):
@@ -174,7 +172,7 @@ def test_the_building_stands_where_it_is(written: Path) -> None:
         assert np.allclose(placed(pose(model) @ pose(shape), corners), z_up(corners))
 
 
-def test_lamps_hang_where_they_are_with_their_colour_and_range(written: Path) -> None:
+def test_lamps_are_in_place_with_their_colour_and_range(written: Path) -> None:
     models = {m.get("name"): m for m in world_of(written).findall("model")}
     lit = [piece for piece in _HOME.things if piece.lamps]
     assert lit
@@ -190,7 +188,7 @@ def test_lamps_hang_where_they_are_with_their_colour_and_range(written: Path) ->
             assert reach == 1.0 or strength / reach**2 == pytest.approx(0.01)
 
 
-def test_a_spot_looks_where_its_lamp_looks(tmp_path: Path) -> None:
+def test_a_spot_has_the_direction_of_its_lamp(tmp_path: Path) -> None:
     piece = turned(next(piece for piece in _HOME.things if piece.lamps))
     looks = (0.6, -0.8, 0.0)
     piece = replace(piece, lamps=(replace(piece.lamps[0], spot=(looks, 0.5)),))
@@ -222,10 +220,10 @@ def test_a_part_moves_by_its_joint_as_the_homes_does(
     write_sdf(exported_home(small_home(item_at(shut, "front", stands_at))), tmp_path)
     model = world_of(tmp_path / "small.sdf").findall("model")[1]
     body, part = model.findall("link")
-    at, joint = model.findall("joint")
+    axes, joint = model.findall("joint")
     assert model.findtext("static") == "false"
-    assert (at.get("type"), at.findtext("parent")) == ("fixed", "world")
-    assert at.findtext("child") == joint.findtext("parent") == body.get("name")
+    assert (axes.get("type"), axes.findtext("parent")) == ("fixed", "world")
+    assert axes.findtext("child") == joint.findtext("parent") == body.get("name")
     assert joint.findtext("child") == part.get("name")
     assert joint.get("type") == str(kind)
     limits = [numbers(joint, f"axis/limit/{end}")[0] for end in ("lower", "upper")]
@@ -261,7 +259,7 @@ def test_no_model_has_a_name_that_sdf_or_the_building_has(tmp_path: Path) -> Non
     assert "world" not in got
 
 
-def test_a_folder_that_holds_something_is_left_alone(tmp_path: Path) -> None:
+def test_a_folder_with_files_is_left_unchanged(tmp_path: Path) -> None:
     (tmp_path / "mine").write_text("mine")
     with pytest.raises(BadInput):
         export_house(repaired_home(), tmp_path, "sdf")

@@ -1,4 +1,4 @@
-"""A home as a URDF, read by MuJoCo: links where the items are, joints that move as the home's do."""
+"""A home as a URDF read by MuJoCo: links at the items' places, joints that move like the home's."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from pbrs_farm.core.house import ItemKind
 from pbrs_farm.core.joints import JointKind
 from pbrs_farm.export.export_homes import export_house
 from pbrs_farm.geometry.opened import item_at
-from tests.inputs.cupboards import cupboard, thing
+from tests.inputs.cupboards import box_item, cupboard
 from tests.inputs.loose_items import loose, small_home
 
 
@@ -49,20 +49,20 @@ def test_a_floor_of_no_thickness_and_a_wall_with_a_doorway_load_and_stay_open(
     tmp_path: Path,
 ) -> None:
     home = small_home(
-        replace(thing("left", (-1, 0, 0), (-0.5, 2, 0.1)), kind=ItemKind.WALL),
+        replace(box_item("left", (-1, 0, 0), (-0.5, 2, 0.1)), kind=ItemKind.WALL),
         loose("mug", (1, 0, 1), (1.1, 0.1, 1.1)),
     )
-    right = thing("right", (0.5, 0, 0), (1, 2, 0.1)).surfaces
-    floor, wall, *others = home.items
+    right = box_item("right", (0.5, 0, 0), (1, 2, 0.1)).surfaces
+    floor, wall, *rest = home.items
     (top,) = floor.surfaces
     level = top.positions[top.faces][..., 1].min(1) > -0.01
     floor = replace(floor, surfaces=(replace(top, faces=top.faces[level]),))
     wall = replace(wall, surfaces=wall.surfaces + right)
-    export_house(replace(home, items=(floor, wall, *others)), tmp_path, "urdf")
+    export_house(replace(home, items=(floor, wall, *rest)), tmp_path, "urdf")
     model = mujoco.MjModel.from_xml_path(str(tmp_path / "small.urdf"))
     state = mujoco.MjData(model)
     mujoco.mj_forward(model, state)
-    # A ray through the doorway, z up, meets nothing; one beside it meets the wall.
+    # A ray through the doorway, z up, hits nothing; one beside it hits the wall.
     for x, is_open in ((0.0, True), (0.7, False)):
         far = mujoco.mj_ray(
             model, state, np.array([x, 1.0, 1.0]), np.array([0, -1.0, 0]), None, 1, -1,
@@ -71,7 +71,7 @@ def test_a_floor_of_no_thickness_and_a_wall_with_a_doorway_load_and_stay_open(
         assert (far < 0) == is_open
 
 
-def test_every_file_is_there_and_loose_things_float(tmp_path: Path) -> None:
+def test_every_file_exists_and_loose_items_float(tmp_path: Path) -> None:
     house = small_home(cupboard(JointKind.PRISMATIC), loose("mug", (1, 0, 1), (1.1, 0.1, 1.1)))
     n_files = export_house(house, tmp_path, "urdf")
     assert n_files == sum(p.is_file() for p in tmp_path.rglob("*"))
@@ -81,7 +81,7 @@ def test_every_file_is_there_and_loose_things_float(tmp_path: Path) -> None:
     assert kinds["cupboard.at"] == "fixed"
     assert kinds["cupboard.front"] == "prismatic"
     children = [child.get("link") for child in root.iter("child")]
-    # Each link but the world hangs at one joint.
+    # Each link except the world has one joint.
     links = [link.get("name") for link in root.findall("link")]
     assert sorted(children, key=str) == sorted(set(links) - {"world"}, key=str)
     assert kinds["mug.at"] == "floating"

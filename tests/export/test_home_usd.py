@@ -1,4 +1,4 @@
-"""A home as an OpenUSD stage: what is written is read back, and the library's validators pass."""
+"""A home as an OpenUSD stage reads back equal, and the library's validators pass."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ from tests.inputs.loose_items import small_home
 
 @pytest.fixture(scope="module")
 def written(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
-    """The built-in home in both forms."""
+    """The built-in home written in both forms."""
     folder = tmp_path_factory.mktemp("usd")
     home = exported_home(repaired_home())
     write_usd(home, folder)
@@ -81,19 +81,19 @@ def test_a_cut_out_keeps_its_cutoff_and_glass_its_holes(
         assert (m.kind, m.alpha_cutoff) == (leaf.kind, pytest.approx(leaf.alpha_cutoff))
         assert m.opacity == pytest.approx(leaf.opacity)
     written = gltf_material(leaf, {texture.id: 0})
-    given = written if written["alphaMode"] == "MASK" else written["extras"]
-    assert given["alphaCutoff"] == leaf.alpha_cutoff
+    gltf_values = written if written["alphaMode"] == "MASK" else written["extras"]
+    assert gltf_values["alphaCutoff"] == leaf.alpha_cutoff
 
 
 @pytest.mark.parametrize("form", ["usdc", "usdz"])
 def test_the_validators_of_usd_find_no_fault(written: dict[str, Path], form: str) -> None:
-    said = UsdUtils.CoalescingDiagnosticDelegate()
+    diagnostics = UsdUtils.CoalescingDiagnosticDelegate()
     stage = Usd.Stage.Open(str(written[form]))
     registry = UsdValidation.ValidationRegistry()
     context = UsdValidation.ValidationContext(registry.GetOrLoadAllValidators())
     errors = [f"{e.GetName()}: {e.GetMessage()}" for e in context.Validate(stage)]
     assert errors == []
-    assert said.TakeUncoalescedDiagnostics() == []
+    assert diagnostics.TakeUncoalescedDiagnostics() == []
 
 
 def test_pieces_collide_loose_ones_have_a_mass_and_lamps_shine(written: dict[str, Path]) -> None:
@@ -118,7 +118,7 @@ def test_pieces_collide_loose_ones_have_a_mass_and_lamps_shine(written: dict[str
 
 @pytest.mark.parametrize("kind", list(JointKind))
 @pytest.mark.parametrize("stands_at", [0.0, 0.2])
-def test_what_opens_is_an_articulation_whose_joint_holds_its_bodies_together(
+def test_opening_parts_are_an_articulation_whose_joint_connects_its_bodies(
     tmp_path: Path, kind: JointKind, stands_at: float
 ) -> None:
     shut = cupboard(kind)
@@ -130,13 +130,13 @@ def test_what_opens_is_an_articulation_whose_joint_holds_its_bodies_together(
     (word,) = set(joints) - {"PhysicsFixedJoint"}
     assert word.lower() == f"physics{kind}joint"
     joint, root = joints[word], joints["PhysicsFixedJoint"]
-    (found,) = [p for p in stage.Traverse() if p.HasAPI(UsdPhysics.ArticulationRootAPI)]
-    assert found == root
+    (articulation,) = [p for p in stage.Traverse() if p.HasAPI(UsdPhysics.ArticulationRootAPI)]
+    assert articulation == root
     unit = 180 / np.pi if kind is JointKind.REVOLUTE else 1.0
     assert joint.GetAttribute("physics:upperLimit").Get() == pytest.approx(
         shut.joints[0].upper * unit
     )
-    # By the frames of both ends, the value at which the part stands.
+    # The part's joint value, computed from the frames of both ends.
     frames = [_world_frame(stage, joint, n) for n in (0, 1)]
     between = np.linalg.inv(frames[0]) @ frames[1]
     if kind is JointKind.PRISMATIC:
@@ -149,7 +149,7 @@ def test_what_opens_is_an_articulation_whose_joint_holds_its_bodies_together(
     assert part.GetRelationship("physics:filteredPairs").GetTargets() == [
         f"{part.GetPath().GetParentPath()}/Part_1"
     ]
-    # Where it is seen it is where the home has it.
+    # The visible prim is at the home's place.
     (prim,) = [p for p in stage.Traverse() if p.GetDisplayName() == "front"]
     box = UsdGeom.BBoxCache(Usd.TimeCode.Default(), ["default"]).ComputeWorldBound(prim)
     low = np.array(box.ComputeAlignedRange().GetMin())
@@ -160,14 +160,14 @@ def test_what_opens_is_an_articulation_whose_joint_holds_its_bodies_together(
     registry = UsdValidation.ValidationRegistry()
     context = UsdValidation.ValidationContext(registry.GetOrLoadAllValidators())
     assert [e.GetMessage() for e in context.Validate(stage)] == []
-    # A body within a body would be no body of its own.
+    # A body within a body would not move independently.
     for p in stage.Traverse():
         above = [a for a in Usd.PrimRange(p) if a != p and a.HasAPI(UsdPhysics.RigidBodyAPI)]
         assert not (p.HasAPI(UsdPhysics.RigidBodyAPI) and above)
 
 
 def _world_frame(stage: Any, joint: Any, end: int) -> np.ndarray:
-    """(4, 4) of one end of a joint in the stage, by its body's place."""
+    """(4, 4) frame of one end of a joint in the stage, from its body's transform."""
     targets = joint.GetRelationship(f"physics:body{end}").GetTargets()
     frame = np.eye(4)
     if targets:

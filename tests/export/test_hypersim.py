@@ -1,4 +1,4 @@
-"""Hypersim's layout, read back by a loader that knows its documentation alone, and by our own reader."""
+"""Hypersim's layout, read back by a loader written from its documentation only, and by our reader."""
 
 from __future__ import annotations
 
@@ -28,12 +28,12 @@ from tests.check.roots import SIZE, make_root
 from tests.export import loaders
 
 SHARES = SplitShares(0.5, 0.5, 0)
-Z_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # from y up: what was up (y) is z now
+Z_UP = np.array([[1, 0, 0], [0, 0, -1], [0, 1, 0]])  # from y up to z up
 
 
 @pytest.fixture(scope="module")
 def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Two homes of different splits; views with pictures and light, one of a camera off the middle."""
+    """Two homes in different splits; views with pictures and light, one with a camera off the middle."""
     folder, base, done = tmp_path_factory.mktemp("finished"), builtin_home(), set[str]()
     rng = np.random.default_rng(5)
     for name in (f"home{k}" for k in range(99)):
@@ -53,7 +53,7 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
             light = {
                 n: rng.random((SIZE[1], SIZE[0], 3), np.float32) for n in ("outdoor", "indoor")
             }
-            light["outdoor"][0, 0] = 1e6  # the sun itself: more than a half float holds
+            light["outdoor"][0, 0] = 1e6  # the sun: more than a half float can hold
             light |= dict.fromkeys(("albedo", "normal"), light["indoor"])
             (view / "radiance.exr").write_bytes(radiance_exr(light))
             np.save(view / "light.npy", light["outdoor"] + light["indoor"])
@@ -74,8 +74,8 @@ def written(root: Path, tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def view_of(root: Path, written: Path, frame: loaders.HypersimFrame) -> Path:
     rows = pd.read_csv(written / "index.csv")
-    at = (rows.scene_name == frame.scene.name) & (rows.camera_name == frame.camera)
-    row = rows[at & (rows.frame_id == frame.frame)].iloc[0]
+    row_mask = (rows.scene_name == frame.scene.name) & (rows.camera_name == frame.camera)
+    row = rows[row_mask & (rows.frame_id == frame.frame)].iloc[0]
     return root / "houses" / row["house"] / "views" / row["view"]
 
 
@@ -84,7 +84,7 @@ def stored(view: Path, name: str) -> np.ndarray:
     return layer_from_bytes(name, file.read_bytes(), str(file))
 
 
-def test_a_scene_is_a_home_through_one_pinhole_and_the_table_has_the_splits(root, written):
+def test_a_scene_is_one_home_and_pinhole_and_the_table_has_the_splits(root, written):
     frames = list(loaders.hypersim(written))
     assert [f.scene.name for f in frames] == [
         "ai_001_001",
@@ -102,7 +102,7 @@ def test_a_scene_is_a_home_through_one_pinhole_and_the_table_has_the_splits(root
     assert "does NOT hold" in card
 
 
-def test_depth_lies_along_the_ray_and_positions_where_the_camera_sees_them(root, written):
+def test_depth_is_along_the_ray_and_positions_are_on_it(root, written):
     for frame in loaders.hypersim(written):
         view = view_of(root, written, frame)
         facts = json.loads((view / "view.json").read_text())
@@ -110,7 +110,7 @@ def test_depth_lies_along_the_ray_and_positions_where_the_camera_sees_them(root,
         depth = stored(view, "depth_z") if exact else stored(view, "depth") / 1000
         np.testing.assert_allclose(frame.planar_depth[depth > 0], depth[depth > 0], rtol=1e-6)
         assert np.isnan(frame.planar_depth[depth == 0]).all()
-        # Poses and projections agree: each point falls on the centre of its pixel.
+        # Poses and projections agree: each point projects to the centre of its pixel.
         position = frame.hdf5("geometry_hdf5", "position")
         y, x = np.nonzero(depth > 0)
         pixels = frame.pixels_of(position[y, x])
@@ -133,11 +133,11 @@ def test_labels_are_those_of_the_view(root, written):
         entity = frame.hdf5("geometry_hdf5", "render_entity_id")
         assert (entity != 0).all()
         np.testing.assert_array_equal(entity == -1, stored(view, "instance") == 0)
-        # Normals look at the camera, and turn with it into the world.
-        local, seen = frame.hdf5("geometry_hdf5", "normal_cam"), stored(view, "valid") > 0
+        # Normals face the camera, and their rotation to the world is consistent.
+        local, valid = frame.hdf5("geometry_hdf5", "normal_cam"), stored(view, "valid") > 0
         published = stored(view, "normal") * (2 / 65535) - 1
         mine = np.stack([published[..., 0], published[..., 2], -published[..., 1]], axis=-1)
-        np.testing.assert_allclose(local[seen], mine[seen], atol=1e-4)
+        np.testing.assert_allclose(local[valid], mine[valid], atol=1e-4)
         world = frame.hdf5("geometry_hdf5", "normal_world")
         np.testing.assert_allclose(world, local @ frame.pose[:3, :3].T, atol=1e-5)
         assert (
@@ -146,7 +146,7 @@ def test_labels_are_those_of_the_view(root, written):
         )
 
 
-def test_boxes_enclose_what_is_seen(written):
+def test_boxes_enclose_the_visible_points(written):
     n_things = 0
     for frame in loaders.hypersim(written):
         name = "mesh/metadata_semantic_instance_bounding_box_object_aligned_2d"
@@ -193,14 +193,14 @@ def test_intrinsic_layers_sum_up_to_the_colour_in_half_floats(picture: str, endi
         ChosenView,
         SimpleNamespace(has=arrays.__contains__, array=arrays.__getitem__, picture=picture),
     )
-    light = hypersim_form._light(view)
+    light = hypersim_form.light_layers(view)
     assert set(light) == {"color", "diffuse_reflectance", "diffuse_illumination", "residual"}
     total = (
         light["diffuse_reflectance"].astype(float) * light["diffuse_illumination"]
         + light["residual"]
     )
     np.testing.assert_allclose(light["color"], total, rtol=1e-3, atol=1e-3)
-    # It is the light itself, and nothing is negative, as Marigold's preparation wants it.
+    # The linear light, without negative values, as Marigold's preparation requires.
     np.testing.assert_allclose(light["color"], np.maximum(radiance, 0), rtol=2e-3, atol=2e-3)
     assert min(array.min() for array in light.values()) >= 0
     is_rest = arrays[f"residual{ending}"] >= 0
@@ -210,13 +210,13 @@ def test_intrinsic_layers_sum_up_to_the_colour_in_half_floats(picture: str, endi
     np.testing.assert_allclose(light["diffuse_reflectance"], linear, rtol=2e-3, atol=1e-5)
 
 
-def test_our_own_reader_gives_the_views_again(root, written):
+def test_our_reader_gives_the_views_again(root, written):
     frames = pf.open(written)
     assert len(frames) == 4
-    for frame, at in zip(frames, loaders.hypersim(written), strict=True):
-        view = view_of(root, written, at)
+    for frame, loaded in zip(frames, loaders.hypersim(written), strict=True):
+        view = view_of(root, written, loaded)
         facts = json.loads((view / "view.json").read_text())
-        assert frame.id == f"{at.scene.name}/{at.camera}_{at.frame:04d}"
+        assert frame.id == f"{loaded.scene.name}/{loaded.camera}_{loaded.frame:04d}"
         np.testing.assert_allclose(frame.k, facts["K"], atol=1e-9)
         pose = facts["world_from_camera_opencv"]
         np.testing.assert_allclose(frame.world_from_camera_opencv, pose, atol=1e-12)
@@ -254,7 +254,7 @@ def test_frames_that_no_pinhole_saw_or_that_are_not_released_are_left_out(writte
     assert [frame.ref.house for frame in frames] == ["ai_001_002", "ai_001_004"]
     assert "tilted projection" in frames.left_out["ai_001_001/cam_00_0000"]
     assert frames.left_out["ai_001_003/cam_00_0000"] == "people"
-    # Without its table a scene has the camera that every reader assumes, of another size.
+    # Without its table a scene has the default camera of every reader, of another size.
     (folder / "metadata_camera_parameters.csv").unlink()
     with pytest.raises(BadInput, match=r"depth_meters\.hdf5.*expected 768 x 1024"):
         pf.open(folder)[0].layer("depth")

@@ -1,4 +1,4 @@
-"""Laser scans as files: PLY and PCD hold the same returns, and these lie on the home's surfaces."""
+"""Laser scans as files: PLY and PCD have the same returns, which are on the home's surfaces."""
 
 from __future__ import annotations
 
@@ -55,9 +55,7 @@ def test_ply_and_pcd_hold_the_same_returns_and_the_same_pose(scans: Path) -> Non
         np.testing.assert_allclose(pose[:3, 3], [float(v) for v in poses[number][1:4]], atol=1e-6)
 
 
-def test_the_scanner_stands_upright_where_the_camera_is_and_looks_where_it_looks(
-    root, scans
-) -> None:
+def test_the_scanner_is_upright_at_the_camera_and_looks_its_way(root, scans) -> None:
     for name in ("v0", "v1"):
         _pcd, pose = loaders.pcd_cloud(scans / f"{name}.pcd")
         camera = np.array(view_of(root, name)["world_from_camera_opencv"])
@@ -76,7 +74,7 @@ def test_returns_lie_on_the_homes_surfaces_in_their_rings(root, scans) -> None:
     np.testing.assert_allclose(np.linalg.norm(local, axis=1), cloud.range, rtol=1e-5)
     elevation = np.degrees(np.arcsin(local[:, 2] / cloud.range))
     np.testing.assert_allclose(elevation, -15 + 2 * cloud.ring.astype(float), atol=1e-3)
-    # The exact range, in every hundredth beam that no mirror turned.
+    # The exact range, for every hundredth unmirrored beam.
     some = cloud[cloud.mirrored == 0].iloc[::100]
     exact = some[["x", "y", "z"]].to_numpy(float) / some.range.to_numpy()[:, None]
     world = exact * some.range_true.to_numpy()[:, None] @ pose[:3, :3].T + pose[:3, 3]
@@ -102,7 +100,7 @@ def test_the_docs_have_the_scanners() -> None:
     assert scanners_table() in page.read_text()
 
 
-def test_a_ring_of_a_flat_scanner_is_one_and_an_unknown_one_is_told(root, tmp_path) -> None:
+def test_a_flat_scanner_has_one_ring_and_an_unknown_one_is_refused(root, tmp_path) -> None:
     export(root, tmp_path / "a", "lidar", scanner="rplidar_a1")
     cloud = loaders.ply_cloud(next((tmp_path / "a").glob("*/v0.ply")))
     assert len(cloud) <= 360

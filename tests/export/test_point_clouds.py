@@ -1,4 +1,4 @@
-"""Point clouds: points lie on the home's surfaces, with the labels of their pixels."""
+"""Point clouds: points are on the home's surfaces, with the labels of their pixels."""
 
 import json
 from pathlib import Path
@@ -21,7 +21,7 @@ KINDS = {"float": "<f4", "uchar": "u1", "ushort": "<u2"}
 
 
 def read_ply(file: Path) -> tuple[np.ndarray, list[str]]:
-    """Vertices and comments of a binary PLY, read as its specification says."""
+    """Vertices and comments of a binary PLY, read according to its specification."""
     head, _, body = file.read_bytes().partition(b"end_header\n")
     lines = head.decode().splitlines()
     assert lines[:2] == ["ply", "format binary_little_endian 1.0"]
@@ -39,7 +39,7 @@ def xyz(vertices: np.ndarray) -> np.ndarray:
 @pytest.fixture(scope="module")
 def roots(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
     """The same views with and without `position`, with pictures."""
-    found = {}
+    folders = {}
     for name in ("with", "without"):
         folder = tmp_path_factory.mktemp(name)
         house = make_root(folder, with_optional=name == "with")
@@ -48,8 +48,8 @@ def roots(tmp_path_factory: pytest.TempPathFactory) -> dict[str, Path]:
             picture[..., 0] = np.arange(SIZE[0])
             picture[..., 1] = np.arange(SIZE[1])[:, None]
             (view / "mlt_il_ol.png").write_bytes(png_from_array(picture))
-        found[name] = house
-    return found
+        folders[name] = house
+    return folders
 
 
 def cloud(house: Path, out: Path, choice: Choice | None = None) -> tuple[np.ndarray, list[str]]:
@@ -61,19 +61,19 @@ def test_points_have_the_labels_colour_and_normal_of_their_pixel(roots, tmp_path
     house = roots["without"]
     vertices, comments = cloud(house, tmp_path / "ply")
     files = {x: array_from_png((house / f"views/v0/{x}.png").read_bytes()) for x in LABELS}
-    seen = files["depth"] > 0
-    assert len(vertices) == seen.sum() > 1000
-    rows, columns = np.nonzero(seen)
+    visible = files["depth"] > 0
+    assert len(vertices) == visible.sum() > 1000
+    rows, columns = np.nonzero(visible)
     assert (vertices["red"] == columns).all()
     assert (vertices["green"] == rows).all()
-    assert (vertices["label"] == files["semantic"][seen]).all()
-    assert (vertices["instance"] == files["instance"][seen]).all()
-    # Floors lie at one height and look up.
+    assert (vertices["label"] == files["semantic"][visible]).all()
+    assert (vertices["instance"] == files["instance"][visible]).all()
+    # Floor points share one height and their normals point up.
     floor = vertices[vertices["label"] == 2]
     assert np.ptp(floor["y"]) < 2e-3
     assert np.allclose(floor["ny"], 1, atol=1e-3)
     assert "label 2 floor" in comments
-    # Other readers read it, too.
+    # Other readers accept it, too.
     mesh = trimesh.load(tmp_path / "ply" / house.name / "v0.ply")
     assert len(mesh.vertices) == len(vertices)
 
@@ -91,13 +91,13 @@ def test_points_project_to_their_pixels_at_their_depth(roots, tmp_path):
 
 
 def test_depth_and_position_give_the_same_points(roots, tmp_path):
-    one, _ = cloud(roots["with"], tmp_path / "a")
-    other, _ = cloud(roots["without"], tmp_path / "b")
-    assert np.abs(xyz(one) - xyz(other)).max() < 2e-3
-    assert np.abs(xyz(one) - xyz(other)).max() > 0  # depth is in whole mm
+    exact, _ = cloud(roots["with"], tmp_path / "a")
+    approximate, _ = cloud(roots["without"], tmp_path / "b")
+    assert np.abs(xyz(exact) - xyz(approximate)).max() < 2e-3
+    assert np.abs(xyz(exact) - xyz(approximate)).max() > 0  # depth has whole mm
 
 
-def test_labels_are_the_users_and_only_what_is_chosen_is_written(roots, tmp_path):
+def test_labels_are_the_users_and_only_chosen_fields_are_written(roots, tmp_path):
     (tmp_path / "map.csv").write_text("from,id,name\nfloor,900,ground\n")
     choice = Choice(classes=class_map(tmp_path / "map.csv"))
     vertices, comments = cloud(roots["without"], tmp_path / "a", choice)

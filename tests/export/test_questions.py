@@ -1,4 +1,4 @@
-"""Questions about space: answers by closed form, no doubtful question, no answer that a blind guesser has."""
+"""Questions about space: closed-form answers, no ambiguous question, no answer that a blind guesser could give."""
 
 import csv
 import json
@@ -31,8 +31,10 @@ KIND = {kind.name: kind for kind in KINDS}
 ROOM_M = 8.0
 
 
-def thing(number: int, noun: str, x: float, z: float, size: Any = (0.5, 0.5, 0.5), y=0.0, **seen):
-    """A box whose middle stands at (x, z) in plan, its bottom at height y."""
+def visible_item(
+    number: int, noun: str, x: float, z: float, size: Any = (0.5, 0.5, 0.5), y=0.0, **seen
+):
+    """A box whose middle is at (x, z) in plan, its bottom at height y."""
     w, h, d = size
     item = box((x - w / 2, y, z - d / 2), (x + w / 2, y + h, z + d / 2), name=f"{noun} {number}")
     facts = {"first_glimpsed": 0, "first_seen": 0, "most_visible": 1.0} | seen
@@ -59,26 +61,30 @@ def drafts(kind: str, clip: Clip):
 
 
 def test_distance_is_between_the_nearest_places_of_the_meshes():
-    # Two boxes of half a metre, corner to corner: their middles are 3 m and 4 m apart along the axes.
-    clip = clip_of(thing(1, "sofa", 1, 1), thing(2, "bed", 4, 5))
+    # Two boxes of half a metre whose middles are 3 m and 4 m apart along the axes.
+    clip = clip_of(visible_item(1, "sofa", 1, 1), visible_item(2, "bed", 4, 5))
     for draft in drafts("object_abs_distance", clip):
         assert draft.answer == f"{math.hypot(2.5, 3.5):.1f}"
-    # An edge over a face.
+    # Nearest between an edge and a face.
     assert clip.gap_m(*clip.things) == pytest.approx(math.hypot(2.5, 3.5), abs=1e-6)
-    over = clip_of(thing(1, "table", 2, 2, (2, 0.5, 2)), thing(2, "lamp", 2.3, 2.1, y=1.75))
+    over = clip_of(
+        visible_item(1, "table", 2, 2, (2, 0.5, 2)), visible_item(2, "lamp", 2.3, 2.1, y=1.75)
+    )
     assert over.gap_m(*over.things) == pytest.approx(1.25, abs=1e-6)
 
 
-def test_things_that_nearly_touch_are_asked_no_distance():
-    clip = clip_of(thing(1, "sofa", 1, 1), thing(2, "bed", 1.7, 1))
+def test_no_distance_is_asked_for_nearly_touching_items():
+    clip = clip_of(visible_item(1, "sofa", 1, 1), visible_item(2, "bed", 1.7, 1))
     assert drafts("object_abs_distance", clip) == []
 
 
 def test_bearings_are_right_positive_seen_from_above():
-    # World y is up and right-handed: who faces -z has +x at the right hand.
-    here, ahead = np.array([0.0, 0.0]), np.array([0.0, -2.0])
+    # World y is up and the axes are right-handed: facing -z, +x is on the right.
+    origin, ahead = np.array([0.0, 0.0]), np.array([0.0, -2.0])
     places = {"ahead": (0, -1), "right": (1, 0), "left": (-1, 0), "front-right": (1, -1)}
-    got = {name: bearing_deg(here, ahead, np.array(at, float)) for name, at in places.items()}
+    got = {
+        name: bearing_deg(origin, ahead, np.array(place, float)) for name, place in places.items()
+    }
     assert got == pytest.approx({"ahead": 0, "right": 90, "left": -90, "front-right": 45})
 
 
@@ -91,31 +97,38 @@ def test_bearings_are_right_positive_seen_from_above():
         ("object_rel_direction_hard", (2.5, 5.5), "back-left"),
     ],
 )  # fmt: skip
-def test_a_direction_is_that_of_one_who_stands_and_faces(kind, at, answer):
-    stand, face = thing(1, "sofa", 4, 4), thing(2, "bed", 4, 1)
-    clip = clip_of(stand, face, thing(3, "desk", *at))
-    found = [d for d in drafts(kind, clip) if d.about == (1, 2, 3)]
-    assert [d.answer for d in found] == [answer]
-    assert answer in found[0].options
+def test_a_direction_is_relative_to_a_standing_and_facing_person(kind, at, answer):
+    stand, face = visible_item(1, "sofa", 4, 4), visible_item(2, "bed", 4, 1)
+    clip = clip_of(stand, face, visible_item(3, "desk", *at))
+    directions = [d for d in drafts(kind, clip) if d.about == (1, 2, 3)]
+    assert [d.answer for d in directions] == [answer]
+    assert answer in directions[0].options
 
 
 def test_a_direction_near_a_border_is_not_asked():
-    clip = clip_of(thing(1, "sofa", 4, 4), thing(2, "bed", 4, 1), thing(3, "desk", 4.2, 2.4))
+    clip = clip_of(
+        visible_item(1, "sofa", 4, 4),
+        visible_item(2, "bed", 4, 1),
+        visible_item(3, "desk", 4.2, 2.4),
+    )
     assert not [d for d in drafts("object_rel_direction_hard", clip) if d.about == (1, 2, 3)]
 
 
-def test_a_direction_that_hangs_on_where_one_stands_by_a_thing_is_not_asked():
-    # From the middle the lamp is 33 degrees to the right; from the right front corner of a bed 3 m wide
-    # it is to the left of the way to the desk.
+def test_a_direction_that_depends_on_the_standing_point_is_not_asked():
+    # From the bed's middle the lamp is 33 degrees to the right; from the right front corner of a
+    # bed 3 m wide
+    # it is to the left of the direction to the desk.
     for width, answers in ((0.5, ["right"]), (3.0, [])):
-        bed = thing(1, "bed", 4, 4, (width, 0.5, 1))
-        clip = clip_of(bed, thing(2, "desk", 4, 1), thing(3, "lamp", 4.9, 2.6, (0.2, 1, 0.2)))
-        found = [d for d in drafts("object_rel_direction_easy", clip) if d.about == (1, 2, 3)]
-        assert [d.answer for d in found] == answers
+        bed = visible_item(1, "bed", 4, 4, (width, 0.5, 1))
+        clip = clip_of(
+            bed, visible_item(2, "desk", 4, 1), visible_item(3, "lamp", 4.9, 2.6, (0.2, 1, 0.2))
+        )
+        directions = [d for d in drafts("object_rel_direction_easy", clip) if d.about == (1, 2, 3)]
+        assert [d.answer for d in directions] == answers
 
 
 def view_of_wall(cx: float, row: Any = None) -> ChosenView:
-    """A camera at (4, 1, 0) that looks along +z, its world's y down: x of the picture is 50 x / z + cx."""
+    """A camera at (4, 1, 0) that looks along +z, its world's y down: the column is 50 x / z + cx."""
     pose = np.eye(4)
     pose[:3, 3] = (4.0, 1.0, 0.0)
     facts = {
@@ -125,9 +138,9 @@ def view_of_wall(cx: float, row: Any = None) -> ChosenView:
     return cast(ChosenView, SimpleNamespace(facts=facts, choice=SimpleNamespace(classes=None)))
 
 
-def test_what_the_edge_of_the_picture_cuts_off_is_not_seen():
-    # A panel 2 m wide 4 m away: from 12.5 px left of cx to as far right of it.
-    panel = thing(1, "cabinet", 4, 4, (2, 1, 0.002), y=0.5)
+def test_an_item_cut_by_the_edge_of_the_picture_is_not_visible():
+    # A panel 2 m wide 4 m away: from 12.5 px left of cx to 12.5 px right of it.
+    panel = visible_item(1, "cabinet", 4, 4, (2, 1, 0.002), y=0.5)
     assert panel.share_within(view_of_wall(50)) == 1.0
     assert panel.share_within(view_of_wall(0)) == pytest.approx(0.5, abs=0.02)
     assert panel.share_within(view_of_wall(-20)) == 0.0
@@ -135,28 +148,30 @@ def test_what_the_edge_of_the_picture_cuts_off_is_not_seen():
         "id": 1, "item": panel.item.id, "name": "Cabinet", "class": "cabinet", "kind": "object",
         "fraction": 0.05, "visible_fraction": 1.0, "truncated": True,
     }  # fmt: skip
-    for cx, is_seen in ((0, True), (-7.5, False)):  # a half and a fifth
-        clip = clips._clip("clip", [view_of_wall(cx, row)], house_of(panel.item))
+    for cx, is_seen in ((0, True), (-7.5, False)):  # a half and a fifth are visible
+        clip = clips.clip_of_views("clip", [view_of_wall(cx, row)], house_of(panel.item))
         assert bool(clip.single) is is_seen
-        # Its size is asked of neither.
+        # Neither is asked for its size.
         assert drafts("object_size_estimation", clip) == []
 
 
-def test_things_that_some_would_count_together_are_not_counted():
-    shelves = [thing(1, "bookshelf", 1, 1), thing(2, "bookshelf", 3, 1)]
+def test_items_that_some_would_count_together_are_not_counted():
+    shelves = [visible_item(1, "bookshelf", 1, 1), visible_item(2, "bookshelf", 3, 1)]
     assert [d.answer for d in drafts("object_counting", clip_of(*shelves))] == ["2"]
-    assert drafts("object_counting", clip_of(*shelves, thing(3, "set of shelves", 5, 5))) == []
+    assert (
+        drafts("object_counting", clip_of(*shelves, visible_item(3, "set of shelves", 5, 5))) == []
+    )
 
 
-def test_a_thing_whose_own_name_another_has_is_not_named():
-    racks = [thing(1, "coat rack", 1, 1), thing(2, "clothes rail", 5, 5)]
+def test_an_item_whose_name_another_has_is_not_named():
+    racks = [visible_item(1, "coat rack", 1, 1), visible_item(2, "clothes rail", 5, 5)]
     assert len(clip_of(*racks).single) == 2
     racks[1].item = replace(racks[1].item, name=racks[0].item.name)
     assert clip_of(*racks).single == []
 
 
 def test_the_size_of_a_sink_which_may_be_that_of_its_cabinet_is_not_asked():
-    assert drafts("object_size_estimation", clip_of(thing(1, "sink", 2, 2))) == []
+    assert drafts("object_size_estimation", clip_of(visible_item(1, "sink", 2, 2))) == []
 
 
 @pytest.mark.parametrize(
@@ -171,60 +186,65 @@ def test_a_bench_is_called_a_bench(kind, name, noun):
     assert noun_of(view_of_wall(0), row) == noun
 
 
-def test_only_what_is_seen_without_doubt_is_asked_about():
-    lamps = [thing(1, "lamp", 1, 1), thing(2, "lamp", 3, 1)]
-    clip = clip_of(*lamps, thing(3, "sofa", 5, 5))
+def test_only_clearly_visible_items_are_asked_about():
+    lamps = [visible_item(1, "lamp", 1, 1), visible_item(2, "lamp", 3, 1)]
+    clip = clip_of(*lamps, visible_item(3, "sofa", 5, 5))
     assert [d.answer for d in drafts("object_counting", clip)] == ["2"]
     assert {t.noun for t in clip.single} == {"sofa"}
-    # A third lamp may be noticed, but is hardly seen.
-    doubtful = clip_of(*lamps, thing(4, "lamp", 6, 6, first_seen=None))
+    # A third lamp may be noticed, but is hardly visible.
+    doubtful = clip_of(*lamps, visible_item(4, "lamp", 6, 6, first_seen=None))
     assert drafts("object_counting", doubtful) == []
     assert not is_countable("row of books")
 
 
-def test_the_size_of_what_is_half_hidden_is_not_asked():
-    whole = clip_of(thing(1, "sofa", 2, 2, (2.13, 0.8, 0.9)))
+def test_the_size_of_a_half_hidden_item_is_not_asked():
+    whole = clip_of(visible_item(1, "sofa", 2, 2, (2.13, 0.8, 0.9)))
     assert [d.answer for d in drafts("object_size_estimation", whole)] == ["213"]
-    cut = clip_of(thing(1, "sofa", 2, 2, (2.13, 0.8, 0.9), most_visible=0.5))
+    cut = clip_of(visible_item(1, "sofa", 2, 2, (2.13, 0.8, 0.9), most_visible=0.5))
     assert drafts("object_size_estimation", cut) == []
 
 
 def test_the_nearest_of_four_is_clearly_the_nearest():
-    others = [
-        thing(k, noun, 1 + 1.5 * k, 1) for k, noun in enumerate(["bed", "desk", "lamp", "sofa"], 1)
+    rest = [
+        visible_item(k, noun, 1 + 1.5 * k, 1)
+        for k, noun in enumerate(["bed", "desk", "lamp", "sofa"], 1)
     ]
-    clip = clip_of(thing(9, "piano", 1, 1), *others)
+    clip = clip_of(visible_item(9, "piano", 1, 1), *rest)
     of_piano = [d for d in drafts("object_rel_distance", clip) if d.about[0] == 9]
     assert {d.answer for d in of_piano} == {"bed"}
     # Two at the same distance: no answer.
-    same = [thing(k, noun, 4 + dx, 4 + dz) for k, (noun, dx, dz) in enumerate(
+    same = [visible_item(k, noun, 4 + dx, 4 + dz) for k, (noun, dx, dz) in enumerate(
         [("bed", 2, 0), ("desk", -2, 0), ("lamp", 0, 2), ("sofa", 0, -2)], 1)]  # fmt: skip
-    clip = clip_of(thing(9, "piano", 4, 4), *same)
+    clip = clip_of(visible_item(9, "piano", 4, 4), *same)
     assert not [d for d in drafts("object_rel_distance", clip) if d.about[0] == 9]
 
 
-def test_a_route_turns_where_its_places_do_and_passes_through_nothing():
-    # From the sofa ahead (-z) to the bed, then to the desk on the right.
-    stops = thing(1, "sofa", 2, 7), thing(2, "bed", 2, 2), thing(3, "desk", 6, 2)
-    found = [d for d in drafts("route_planning", clip_of(*stops)) if d.about == (1, 2, 3)]
-    assert [d.answer for d in found] == ["turn right"]
-    blocked = clip_of(*stops, thing(4, "piano", 4, 2, (0.5, 1.0, 2.0)))
+def test_a_route_turns_at_its_places_and_passes_through_nothing():
+    # From the sofa ahead (-z) to the bed, then right to the desk.
+    stops = (
+        visible_item(1, "sofa", 2, 7),
+        visible_item(2, "bed", 2, 2),
+        visible_item(3, "desk", 6, 2),
+    )
+    routes = [d for d in drafts("route_planning", clip_of(*stops)) if d.about == (1, 2, 3)]
+    assert [d.answer for d in routes] == ["turn right"]
+    blocked = clip_of(*stops, visible_item(4, "piano", 4, 2, (0.5, 1.0, 2.0)))
     assert not [d for d in drafts("route_planning", blocked) if d.about == (1, 2, 3)]
 
 
 def test_order_of_appearance_and_rooms_are_asked_of_walks():
     things = [
-        thing(k, noun, 1 + k, 1, first_glimpsed=20 * k, first_seen=20 * k + 2)
+        visible_item(k, noun, 1 + k, 1, first_glimpsed=20 * k, first_seen=20 * k + 2)
         for k, noun in enumerate(["bed", "desk", "lamp", "sofa"])
     ]
     clip = clip_of(*things, frames=100)
     assert {d.answer for d in drafts("obj_appearance_order", clip)} == {"bed, desk, lamp, sofa"}
     assert [d.answer for d in drafts("room_size_estimation", clip)] == [f"{ROOM_M**2:.1f}"]
-    # One that is noticed before the other is well seen has no place in an order.
-    things[1] = thing(1, "desk", 2, 1, first_glimpsed=3, first_seen=22)
+    # An item noticed before the other is clearly visible has no place in an order.
+    things[1] = visible_item(1, "desk", 2, 1, first_glimpsed=3, first_seen=22)
     assert drafts("obj_appearance_order", clip_of(*things, frames=100)) == []
-    asked = {q.kind for q in Asker().asked([clip_of(*things)])}
-    assert not asked & {"obj_appearance_order", "room_size_estimation"}
+    kinds = {q.kind for q in Asker().asked([clip_of(*things)])}
+    assert not kinds & {"obj_appearance_order", "room_size_estimation"}
 
 
 def scattered(seed: int) -> Clip:
@@ -232,12 +252,12 @@ def scattered(seed: int) -> Clip:
     nouns = ["bed", "desk", "lamp", "sofa", "piano", "table", "chair", "sink"]
     cells = rng.permutation(16)[: len(nouns)]
     return clip_of(*(
-        thing(k, noun, 1 + 2 * (c % 4), 1 + 2 * (c // 4)) for k, (noun, c) in enumerate(zip(nouns, cells, strict=True), 1)
+        visible_item(k, noun, 1 + 2 * (c % 4), 1 + 2 * (c // 4)) for k, (noun, c) in enumerate(zip(nouns, cells, strict=True), 1)
     ))  # fmt: skip
 
 
 @pytest.mark.long
-def test_no_answer_and_no_letter_is_the_usual_one():
+def test_no_answer_and_no_letter_is_the_most_common():
     questions = Asker().asked([scattered(seed) for seed in range(16)])
     scores = blind_scores(questions)
     assert scores["object_rel_distance"][1] <= 0.35
@@ -262,17 +282,17 @@ def test_the_noun_of_a_question_may_give_its_answer_away():
 
 
 def test_a_relative_accuracy_is_the_share_of_thresholds_passed():
-    # 10 % off passes .5, .55 ... .85 but not .9, whose limit it meets, nor .95.
+    # An error of 10 % passes .5, .55 ... .85 but not .9, whose limit it equals, nor .95.
     assert mean_relative_accuracy(1.1, 1.0) == pytest.approx(0.8)
 
 
-def test_a_phrase_fits_one_thing_alone():
+def test_a_phrase_fits_exactly_one_item():
     rows = [
         {"id": k, "box2d": [x, 0, x + 10, 10]} for k, x in ((1, 5), (2, 60), (3, 30), (4, 80))
     ]  # fmt: skip
-    table, stool = thing(3, "table", 4, 4, (1.5, 0.7, 1.5)), thing(4, "stool", 7, 7)
-    on_table = thing(2, "vase", 4, 4, (0.2, 0.3, 0.2), y=0.7)
-    clip = clip_of(thing(1, "vase", 1, 1), on_table, table, stool, facts={"instances": rows})
+    table, stool = visible_item(3, "table", 4, 4, (1.5, 0.7, 1.5)), visible_item(4, "stool", 7, 7)
+    on_table = visible_item(2, "vase", 4, 4, (0.2, 0.3, 0.2), y=0.7)
+    clip = clip_of(visible_item(1, "vase", 1, 1), on_table, table, stool, facts={"instances": rows})
     phrases = {r.phrase: r.instance for r in references_of(clip)}
     assert phrases == {
         "the vase on the left": 1, "the vase on the right": 2, "the vase on the table": 2,
@@ -287,9 +307,9 @@ def test_a_phrase_fits_one_thing_alone():
         (MaterialKind.OPAQUE, (230, 230, 230), "white"), (MaterialKind.MIRROR, (230, 230, 230), ""),
     ],
 )  # fmt: skip
-def test_a_phrase_names_the_colour_of_what_has_one(kind, rgb, colour):
+def test_a_phrase_names_the_colour_of_a_coloured_item(kind, rgb, colour):
     row = {"id": 1, "box2d": [0, 0, 10, 10]}
-    clip = clip_of(thing(1, "cabinet", 1, 1), facts={"instances": [row]})
+    clip = clip_of(visible_item(1, "cabinet", 1, 1), facts={"instances": [row]})
     layers = {
         "instance": np.ones((10, 10), np.uint16),
         "albedo": np.full((10, 10, 3), rgb, np.uint8),
@@ -320,7 +340,7 @@ def test_questions_of_a_real_view_are_right_by_a_checker_that_shares_no_code(tmp
     assert table.num_rows == len(rows) > 4
     assert all((out / row["media"]).is_file() for row in rows)
     assert wrong_answers(tmp_path / "root", out) == []
-    # The checker finds what is wrong.
+    # The checker finds the wrong answer.
     rows[0]["ground_truth"] = "77"
     (out / "questions.jsonl").write_text("".join(f"{json.dumps(row)}\n" for row in rows))
     assert len(wrong_answers(tmp_path / "root", out)) == 1
@@ -349,10 +369,10 @@ def test_how_often_the_few_answers_of_a_kind_are_right_differs_by_two_at_most(
 
     kind = QuestionKind("side", drafts, ("Where is the {a} {here}?",), answers=("left", "right"))
     monkeypatch.setattr(asking, "KINDS", (kind,))
-    own = [SimpleNamespace(name=f"c{k}", is_walk=False) for k in range(12)]
-    asked = Asker().asked(own)
-    # Two "left"; then nothing is asked until a "right" may be, which makes room for one "left".
-    assert [(q.clip, q.answer) for q in asked] == [
+    clips = [SimpleNamespace(name=f"c{k}", is_walk=False) for k in range(12)]
+    questions = Asker().asked(clips)
+    # Two "left"; the next question waits for a "right", after which one more "left" fits.
+    assert [(q.clip, q.answer) for q in questions] == [
         ("c0", "left"), ("c0", "left"), ("c7", "right"), ("c7", "left"),
     ]  # fmt: skip
 
@@ -365,9 +385,9 @@ def test_no_number_is_the_answer_more_often_than_all_others_and_two(
 
     kind = QuestionKind("count", drafts, ("How many {a} {here}?",))
     monkeypatch.setattr(asking, "KINDS", (kind,))
-    own = [SimpleNamespace(name=f"c{k}", is_walk=False) for k in range(9)]
-    asked = Asker().asked(own)
-    assert [(q.clip, q.answer) for q in asked] == [
+    clips = [SimpleNamespace(name=f"c{k}", is_walk=False) for k in range(9)]
+    questions = Asker().asked(clips)
+    assert [(q.clip, q.answer) for q in questions] == [
         ("c0", "2"),
         ("c1", "2"),
         ("c5", "3"),

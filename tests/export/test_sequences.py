@@ -1,4 +1,4 @@
-"""A walk in stereo in the forms that SLAM, reconstruction and stereo tools read."""
+"""A stereo walk in the formats of SLAM, reconstruction and stereo tools."""
 
 import json
 from pathlib import Path
@@ -12,7 +12,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.export.chosen_view import Choice, ChosenView, require_lens, resize_layer
 from pbrs_farm.export.export_views import export
-from pbrs_farm.export.forms.colmap import _camera_line as colmap_camera
+from pbrs_farm.export.forms.colmap import colmap_camera_line
 from pbrs_farm.formats.output_folder import views_of
 from pbrs_farm.images import array_from_png
 from pbrs_farm.run.local import run_local
@@ -69,28 +69,32 @@ def test_colmaps_points_project_to_the_pixels_they_came_from(root: Path, tmp_pat
     sparse = only(tmp_path / "x") / "sparse/0"
     models = [line.split() for line in (sparse / "cameras.txt").read_text().splitlines()]
     model = models[0]
-    # Both eyes are sensors of their own, and alike.
+    # Both eyes are separate sensors with equal values.
     assert [m[0] for m in models] == ["1", "2"]
     assert models[1][1:] == model[1:]
     assert model[1:4] == ["PINHOLE", "64", "48"]
     fx, fy, cx, cy = map(float, model[4:])
     points = [line.split() for line in (sparse / "points3D.txt").read_text().splitlines()]
     rows = (sparse / "images.txt").read_text().splitlines()
-    # gsplat and pycolmap take an empty line for the end of the file.
+    # gsplat and pycolmap read an empty line as the end of the file.
     assert all(rows)
     names = []
     for pose_row, seen_row in zip(rows[::2], rows[1::2], strict=True):
         number, w, x, y, z, *shift, camera, name = pose_row.split()
         names.append(name)
         assert camera == ("2" if "_right" in name else "1")
-        seen = np.array(seen_row.split(), float).reshape(-1, 3)
-        own = [points[int(n) - 1] for n in seen[:, 2]]
-        # Each point is seen by this picture alone, at the place in its row that its track says.
-        assert [point[8:] for point in own] == [[number, str(k)] for k in range(len(own))]
+        observed = np.array(seen_row.split(), float).reshape(-1, 3)
+        observed_points = [points[int(n) - 1] for n in observed[:, 2]]
+        # Each point has one observation, in this picture, at the index of its track.
+        assert [point[8:] for point in observed_points] == [
+            [number, str(k)] for k in range(len(observed_points))
+        ]
         turn = Rotation.from_quat([float(v) for v in (x, y, z, w)])
-        local = turn.apply(np.array([point[1:4] for point in own], float)) + np.array(shift, float)
-        at = local[:, :2] / local[:, 2:] * (fx, fy) + (cx, cy)
-        np.testing.assert_allclose(at, seen[:, :2], atol=0.05)
+        local = turn.apply(np.array([point[1:4] for point in observed_points], float)) + np.array(
+            shift, float
+        )
+        projected = local[:, :2] / local[:, 2:] * (fx, fy) + (cx, cy)
+        np.testing.assert_allclose(projected, observed[:, :2], atol=0.05)
     assert names[0] == "frame_00000.png"
     assert [point[0] for point in points] == [str(n) for n in range(1, len(points) + 1)]
 
@@ -125,7 +129,7 @@ def test_tum_writes_both_views_of_every_pair(root: Path, tmp_path: Path) -> None
     np.testing.assert_allclose(right, stored, atol=1e-7)
 
 
-def test_kittis_maps_are_in_its_steps_and_noc_leaves_out_what_is_hidden(
+def test_kittis_maps_have_its_units_and_noc_leaves_out_hidden_pixels(
     root: Path, tmp_path: Path
 ) -> None:
     export(root, tmp_path / "x", "kitti")
@@ -147,7 +151,7 @@ def test_kittis_maps_are_in_its_steps_and_noc_leaves_out_what_is_hidden(
     p2, p3 = (out / "calib/000000.txt").read_text().strip().split("\n")
     left, right = (np.array(p.split()[1:], float).reshape(3, 4) for p in (p2, p3))
     assert (left - right)[0, 3] == pytest.approx(left[0, 0] * 0.065)
-    # Its pixels count from the centre of the first: the middle of 64 x 48 is (31.5, 23.5).
+    # Its pixel coordinates start at the centre of the first: the middle of 64 x 48 is (31.5, 23.5).
     assert left[:2, 2] == pytest.approx([31.5, 23.5])
 
 
@@ -156,7 +160,7 @@ def test_a_walk_has_a_laser_scan_a_frame(root: Path, tmp_path: Path) -> None:
     house = only(tmp_path / "x")
     poses = poses_from_tum((house / "poses.txt").read_text(), "poses.txt")
     assert [p.time_s for p in poses] == pytest.approx([0.0, 0.2, 0.4])
-    # The left eye's: a scanner has no pair.
+    # Scans of the left eye only: a scanner has no pair.
     assert sorted(p.name for p in house.glob("*.pcd")) == [f"frame_{k:05d}.pcd" for k in range(3)]
     eye = np.array(facts_of(root, "frame_00001")["world_from_camera_opengl"])[:3, 3]
     words = (house / "poses.txt").read_text().splitlines()[1].split()
@@ -195,7 +199,9 @@ def test_forms_name_the_lens_or_refuse_it() -> None:
         cast(ChosenView, SimpleNamespace(id="a", facts=facts | {"lens": lens}))
         for lens in (radtan, cube)
     )
-    assert colmap_camera(bent) == "FULL_OPENCV 640 480 500 501 320 240 0.1 0.2 0.3 0.4 0.5 0 0 0"
+    assert (
+        colmap_camera_line(bent) == "FULL_OPENCV 640 480 500 501 320 240 0.1 0.2 0.3 0.4 0.5 0 0 0"
+    )
     for form, models in (("colmap", ("radtan", "fisheye")), ("kitti", ()), ("released", ())):
         with pytest.raises(BadInput, match=r"lens\.model cubemap"):
             require_lens(strip, form, *models)

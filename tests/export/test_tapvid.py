@@ -1,4 +1,4 @@
-"""Films with point tracks as TAP-Vid's DAVIS file has them: what its readers take is what tracks.npz says."""
+"""Films with point tracks in the format of TAP-Vid's DAVIS file, compared with tracks.npz."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SIZE = (64, 48)
 
 @pytest.fixture(scope="module")
 def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """A film of three frames of a door that opens, with tracks, and a view that is no frame."""
+    """A film of three frames of an opening door, with tracks, and a view that is not a frame."""
     home = small_home().open("door_inner", at={0: 0, 1: 1})
     camera = home.cameras_around("door_inner", distance_m=(1.5, 2.5))[0].camera.with_size(*SIZE)
     out = tmp_path_factory.mktemp("tapvid") / "root"
@@ -32,13 +32,13 @@ def test_a_reader_of_tap_vid_finds_video_points_and_occlusion(root: Path, tmp_pa
     pf.open(root).export(tmp_path / "out", "tapvid")
     (video,) = pickle.loads((tmp_path / "out/tapvid.pkl").read_bytes()).values()
     assert (video["video"].shape, video["video"].dtype) == ((3, 48, 64, 3), np.uint8)
-    held = np.load(next(root.glob("houses/*/tracks.npz")))
-    n = len(held["points"])
+    tracks = np.load(next(root.glob("houses/*/tracks.npz")))
+    n = len(tracks["points"])
     assert n > 900
     assert (video["points"].shape, video["points"].dtype) == ((n, 3, 2), np.float32)
     assert (video["occluded"].shape, video["occluded"].dtype) == ((n, 3), bool)
-    np.testing.assert_allclose(video["points"] * SIZE, held["points"], rtol=1e-5, atol=1e-3)
-    # As its loaders ask: each point begins in the first frame that sees it, within the picture.
+    np.testing.assert_allclose(video["points"] * SIZE, tracks["points"], rtol=1e-5, atol=1e-3)
+    # As its loaders require: each point starts in the first frame that sees it, within the picture.
     first = (~video["occluded"]).argmax(1)
     begin = video["points"][np.arange(n), first]
     assert ((begin >= 0) & (begin <= 1)).all()
@@ -51,7 +51,7 @@ def test_of_some_frames_the_points_that_they_see_are_exported(root: Path, tmp_pa
     assert not video["occluded"].any()
 
 
-def test_a_home_without_tracks_is_told(root: Path, tmp_path: Path) -> None:
+def test_a_home_without_tracks_is_reported(root: Path, tmp_path: Path) -> None:
     tracks = next(root.glob("houses/*/tracks.npz"))
     data = tracks.read_bytes()
     tracks.write_bytes(data[:-200])
@@ -63,7 +63,7 @@ def test_a_home_without_tracks_is_told(root: Path, tmp_path: Path) -> None:
     tracks.write_bytes(data)
 
 
-def test_tracks_of_what_is_no_film_are_refused_before_anything_is_made() -> None:
+def test_tracks_of_views_that_are_no_film_are_refused_before_any_output() -> None:
     want = Wanted(tracks=True)
     with pytest.raises(pf.BadInput, match="needs a walk"):
         check_layers(want, recipe_from_name("preview"))

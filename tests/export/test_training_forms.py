@@ -1,4 +1,4 @@
-"""Forms that training programs read, read back by loaders that know their documentation alone."""
+"""Formats of training programs, read back by loaders written from their documentation only."""
 
 from __future__ import annotations
 
@@ -56,23 +56,23 @@ def views(root: Path) -> list[Path]:
 
 
 def within_png(depth: np.ndarray) -> np.ndarray:
-    """Metres of depth.png, 0 for its last value."""
+    """Metres in depth.png, 0 for its last value."""
     return np.where(depth == 65535, 0, depth) / 1000
 
 
 def test_yolo_reads_metric_depth_and_nothing_else(root, tmp_path, monkeypatch):
     assert export(root, tmp_path / "set", "yolo-depth", shares=SplitShares(1, 0, 0)) == (2, 5)
-    # From any directory: ultralytics resolves a yaml's folders from the yaml itself.
+    # Works in any directory: ultralytics resolves a yaml's folders relative to the yaml.
     monkeypatch.chdir(tmp_path)
     assert "path:" not in (tmp_path / "set/data.yaml").read_text()
-    for split in ("train", "val"):  # with one home they are the same
-        found = list(loaders.yolo_depth(Path(os.path.relpath("set/data.yaml")), split))
-        for k, (example, view) in enumerate(zip(found, views(root), strict=True)):
+    for split in ("train", "val"):  # equal with one home
+        examples = list(loaders.yolo_depth(Path(os.path.relpath("set/data.yaml")), split))
+        for k, (example, view) in enumerate(zip(examples, views(root), strict=True)):
             np.testing.assert_array_equal(example.rgb, gradient(k))
             np.testing.assert_array_equal(example.target, within_png(png(view / "depth.png")))
 
 
-def test_yolos_depth_is_metres_in_numpy_where_depth_z_is_asked_for(root, tmp_path):
+def test_yolos_depth_is_metres_in_numpy_if_depth_z_is_requested(root, tmp_path):
     export(root, tmp_path / "set", "yolo-depth", choice=Choice(layers=("depth_z",)))
     first = next(loaders.yolo_depth(tmp_path / "set/data.yaml", "val"))
     assert first.target.dtype == np.float32
@@ -82,19 +82,19 @@ def test_yolos_depth_is_metres_in_numpy_where_depth_z_is_asked_for(root, tmp_pat
 def test_yolos_masks_name_the_class_of_every_pixel(root, tmp_path):
     assert export(root, tmp_path / "set", "yolo-semantic") == (2, 5)
     names = np.array(["", *NYU40_NAMES[1:]])
-    found = loaders.yolo_semantic(tmp_path / "set/data.yaml", "train")
-    for example, view in zip(found, views(root), strict=True):
+    examples = loaders.yolo_semantic(tmp_path / "set/data.yaml", "train")
+    for example, view in zip(examples, views(root), strict=True):
         np.testing.assert_array_equal(example.target, names[png(view / "semantic.png")])
 
 
-def test_yolos_masks_take_classes_of_ones_own(root, tmp_path):
+def test_yolos_masks_take_custom_classes(root, tmp_path):
     (tmp_path / "mine.csv").write_text("from,id,name\nchair,7,seat\nbed,3,bed: a\n")
     choice = Choice(classes=class_map(tmp_path / "mine.csv"))
     export(root, tmp_path / "set", "yolo-semantic", choice=choice)
     names = np.full(41, "", object)
     names[[NYU40_NAMES.index("chair"), NYU40_NAMES.index("bed")]] = "seat", "bed: a"
-    found = loaders.yolo_semantic(tmp_path / "set/data.yaml", "train")
-    for example, view in zip(found, views(root), strict=True):
+    examples = loaders.yolo_semantic(tmp_path / "set/data.yaml", "train")
+    for example, view in zip(examples, views(root), strict=True):
         np.testing.assert_array_equal(example.target, names[png(view / "semantic.png")])
 
 
@@ -113,7 +113,7 @@ def test_marigold_reads_depth_and_normals_from_its_lists(root, tmp_path):
         valid = png(view / "valid.png") > 0
         np.testing.assert_allclose(example.target[valid], mine[valid], atol=1e-4)
         assert (example.target[~valid] == 0).all()
-        # Z points to the camera: no surface turns its back.
+        # Z points to the camera: no visible surface faces away.
         assert (example.target[valid] * rays()[valid]).sum(-1).max() < 1e-3
 
 
@@ -144,8 +144,8 @@ def test_marigold_reads_light_and_materials_from_their_lists(root, tmp_path):
     assert min(albedo.min(), shading.min(), residual.min()) >= 0
     again = albedo * shading + residual
     np.testing.assert_allclose(again, np.maximum(radiance, 0), atol=1e-4)
-    found = loaders.marigold_appearance(tmp_path / "set", "filename_list_iid_appearance.txt")
-    for example, view in zip(found, views(folder), strict=True):
+    examples = loaders.marigold_appearance(tmp_path / "set", "filename_list_iid_appearance.txt")
+    for example, view in zip(examples, views(folder), strict=True):
         surface, rough, metallic, mask = example.target
         np.testing.assert_array_equal(surface, colours)
         np.testing.assert_allclose(rough * 255, grey["roughness"], atol=0.1)
@@ -155,16 +155,16 @@ def test_marigold_reads_light_and_materials_from_their_lists(root, tmp_path):
 
 
 def rays() -> np.ndarray:
-    """(H, W, 3) of the root's pin-hole, x right, y up, z backward."""
+    """(H, W, 3) rays of the root's pinhole camera, x right, y up, z backward."""
     i = Intrinsics.from_hfov(*SIZE)
     x, y = np.meshgrid(np.arange(SIZE[0]) + 0.5, np.arange(SIZE[1]) + 0.5)
-    found = np.stack([(x - i.cx) / i.fx, -(y - i.cy) / i.fy, -np.ones_like(x)], axis=-1)
-    return found / np.linalg.norm(found, axis=-1, keepdims=True)
+    directions = np.stack([(x - i.cx) / i.fx, -(y - i.cy) / i.fy, -np.ones_like(x)], axis=-1)
+    return directions / np.linalg.norm(directions, axis=-1, keepdims=True)
 
 
 @pytest.fixture(scope="module")
 def panoramas(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """Tilted panoramas of a room whose pixels' colours are their directions in the world."""
+    """Tilted panoramas of a room, coloured by world direction."""
     folder, home = tmp_path_factory.mktemp("panoramas"), builtin_home()
     size = (256, 128)
     i = Intrinsics(*size, size[0] / (2 * np.pi), size[1] / np.pi, 128, 64, Lens("equirect"))
@@ -195,32 +195,32 @@ def panoramas(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def test_horizonnet_finds_the_rooms_corners_in_upright_pictures(panoramas, tmp_path):
     assert export(panoramas, tmp_path / "set", "layoutnet") == (3, 5)
     assert "a_pinhole: has no panorama" in (tmp_path / "set/left_out.txt").read_text()
-    room, found = builtin_home().rooms[0], list(loaders.horizonnet(tmp_path / "set"))
-    for example, eye in zip(found, np.array([(2.0, 1.5, 2.0), (1.2, 1.4, 3.0)]), strict=True):
+    room, examples = builtin_home().rooms[0], list(loaders.horizonnet(tmp_path / "set"))
+    for example, eye in zip(examples, np.array([(2.0, 1.5, 2.0), (1.2, 1.4, 3.0)]), strict=True):
         corners = example.target
         longitude = ((corners[:, 0] + 0.5) / 1024 - 0.5) * 2 * np.pi
         down = np.tan(((corners[:, 1] + 0.5) / 512 - 0.5) * np.pi)
         assert (np.diff(corners[::2, 0]) > 0).all()
-        # Where the floor's line is tells how far a corner is; the ceiling then tells its height.
+        # The floor's line gives the distance of a corner, and the ceiling's its height.
         far = (eye[1] - room.floor_y) / down[1::2]
         np.testing.assert_allclose(eye[1] - far * down[::2], room.ceiling_y, atol=0.01)
         plan = far[:, None] * np.stack([np.cos(longitude[::2]), np.sin(longitude[::2])], axis=1)
         mine = np.sort(np.linalg.norm(room.polygon - eye[[0, 2]], axis=1))
         np.testing.assert_allclose(np.sort(far), mine, atol=0.01)
-        # Walls lie along the picture's axes.
+        # Walls are along the picture's axes.
         walls = np.roll(plan, -1, axis=0) - plan
         np.testing.assert_allclose(np.abs(walls).min(1), 0, atol=0.01)
-        # The picture has each corner where the label says.
+        # Each corner of the label has its colour in the picture.
         x, y = np.rint(corners[1::2]).astype(int).T
-        seen = example.rgb[y, x] / 127.5 - 1
-        wanted = np.insert(room.polygon, 1, room.floor_y, axis=1) - eye
-        wanted /= np.linalg.norm(wanted, axis=1, keepdims=True)
-        apart = np.linalg.norm(seen[:, None] - wanted[None], axis=-1)
-        assert apart.min(1).max() < 0.04
-        assert len(set(apart.argmin(1))) == len(room.polygon)
+        colours = example.rgb[y, x] / 127.5 - 1
+        expected = np.insert(room.polygon, 1, room.floor_y, axis=1) - eye
+        expected /= np.linalg.norm(expected, axis=1, keepdims=True)
+        distances = np.linalg.norm(colours[:, None] - expected[None], axis=-1)
+        assert distances.min(1).max() < 0.04
+        assert len(set(distances.argmin(1))) == len(room.polygon)
 
 
-def test_views_without_what_a_form_needs_are_refused_or_named(root, tmp_path):
+def test_views_without_a_forms_layers_are_refused_or_named(root, tmp_path):
     with pytest.raises(BadInput, match="no view is a panorama"):
         export(root, tmp_path / "a", "layoutnet")
     none = Choice(modes=())

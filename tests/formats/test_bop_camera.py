@@ -1,4 +1,4 @@
-"""A BOP camera.json gives size and K, and one that does not fit is told."""
+"""A BOP camera.json gives size and K, and an invalid one is refused."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def test_size_and_k_are_those_of_the_file(tmp_path: Path) -> None:
 @pytest.mark.parametrize(
     ("change", "says"), [({"fx": 0}, "fx: expected more than 0"), ({"width": "x"}, "width")]
 )
-def test_what_does_not_fit_is_told(change: dict, says: str, tmp_path: Path) -> None:
+def test_an_invalid_camera_is_refused(change: dict, says: str, tmp_path: Path) -> None:
     (tmp_path / "camera.json").write_text(json.dumps({**YCBV, **change}))
     with pytest.raises(BadInput, match=rf"camera\.json: {says}"):
         camera_of_bop(tmp_path / "camera.json")

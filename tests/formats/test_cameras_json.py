@@ -1,4 +1,4 @@
-"""cameras.json keeps a lens, and one of before there were lenses is a pin-hole's."""
+"""cameras.json keeps a lens; an old file without lenses is a pinhole."""
 
 from __future__ import annotations
 

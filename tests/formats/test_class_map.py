@@ -28,10 +28,10 @@ def table(folder: Path, *rows: str) -> Path:
     [
         (["sofa,1,seat", "lamp,2,light"], [1, 2, 0]),
         (["arm*,7,arms", "sofa,1,seat"], [7, 0, 0]),
-        (["sofa,1,seat", "arm*,7,arms"], [1, 0, 0]),  # the first row that fits
-        (["X#12,4,chair twelve"], [4, 0, 0]),  # a source's class, case apart
+        (["sofa,1,seat", "arm*,7,arms"], [1, 0, 0]),  # the first matching row
+        (["X#12,4,chair twelve"], [4, 0, 0]),  # a source's class, ignoring case
         (["plant,5,green", "FLOOR LAMP,6,tall"], [0, 6, 5]),  # a kind, a whole name
-        (["fern,0,", "*,9,thing"], [9, 9, 0]),  # 0 takes out what a later row would take
+        (["fern,0,", "*,9,thing"], [9, 9, 0]),  # 0 excludes items that a later row would match
     ],
 )
 def test_the_first_row_that_fits_an_instance_wins(tmp_path, rows, ids):
@@ -49,13 +49,13 @@ def test_a_label_is_the_class_of_each_instance(tmp_path):
     assert not empty.any()
 
 
-def test_columns_may_stand_in_any_order_and_a_mark_of_bytes_first(tmp_path):
+def test_columns_may_have_any_order_and_a_byte_order_mark_may_come_first(tmp_path):
     file = tmp_path / "map.csv"
     file.write_bytes(b'\xef\xbb\xbfid,Name,from\r\n1,"a, b",chair\r\n')
     assert class_map(file).names == {1: "a, b"}
 
 
-def test_a_class_of_parts_of_the_building_alone_is_structure(tmp_path):
+def test_a_class_of_only_building_parts_is_structure(tmp_path):
     rows = ["wall,1,shell", "floor,1,shell", "door,2,mixed", "chair,2,mixed"]
     assert class_map(table(tmp_path, *rows)).structure == {1}
 
@@ -80,7 +80,7 @@ def test_a_class_of_parts_of_the_building_alone_is_structure(tmp_path):
         (["chair,0,"], "names no class"),
     ],
 )
-def test_what_is_wrong_with_a_table_is_told_with_its_line(tmp_path, rows, match):
+def test_faults_of_a_table_are_reported_with_their_line(tmp_path, rows, match):
     with pytest.raises(BadInput, match=rf"map\.csv.*{match}"):
         class_map(table(tmp_path, *rows))
 
@@ -94,7 +94,7 @@ def test_what_is_wrong_with_a_table_is_told_with_its_line(tmp_path, rows, match)
         ("from,id,name,id\n", "line 1: has the column id twice"),
     ],
 )
-def test_a_head_that_lacks_a_column_is_told(tmp_path, text, match):
+def test_a_header_without_a_column_is_refused(tmp_path, text, match):
     (tmp_path / "map.csv").write_text(text)
     with pytest.raises(BadInput, match=match):
         class_map(tmp_path / "map.csv")

@@ -23,7 +23,7 @@ from tests.read.small_houses import full_house
 
 
 def assert_same(a: Any, b: Any, place: str = "house") -> None:
-    """Equal types, values, dtypes and bits, all the way down."""
+    """Equal types, values, dtypes and bits, recursively."""
     assert type(a) is type(b), place
     if is_dataclass(a):
         for field in fields(a):
@@ -86,7 +86,7 @@ def test_texture_coordinates_show_the_picture_upright_in_a_gltf_viewer() -> None
     scene = trimesh.load_scene(io.BytesIO(bundle_from_house(house)[0]), file_type="glb")
     floor = next(g for g in scene.geometry.values() if g.bounds[1][0] == 5)
     assert uvs is not None
-    turns = floor.visual.uv - uvs  # trimesh turns v up again: whole turns of the texture remain
+    turns = floor.visual.uv - uvs  # trimesh flips v again: whole turns of the texture remain
     assert np.allclose(turns, np.round(turns), atol=1e-6)
 
 
@@ -120,7 +120,7 @@ def with_maps(house: House) -> House:
     return replace(house, materials=(mapped, *house.materials[1:]))
 
 
-def test_roughness_and_maps_read_back_and_stand_where_gltf_viewers_look() -> None:
+def test_roughness_and_maps_read_back_and_are_stored_as_gltf_viewers_expect() -> None:
     house = with_maps(full_house())
     glb_data, json_data = bundle_from_house(house)
     assert_same(house, house_from_bundle(glb_data, json_data))
@@ -133,7 +133,7 @@ def test_roughness_and_maps_read_back_and_stand_where_gltf_viewers_look() -> Non
 
 def test_house_json_names_every_field_of_a_material_and_a_lamp() -> None:
     row = json.loads(bundle_from_house(full_house())[1])
-    # The cutoff of alpha is named where it is not the usual one.
+    # The alpha cutoff is written if it is not the default.
     usual, *_, holed = row["materials"]
     assert set(usual) == set(Material.__slots__) - {"alpha_cutoff"}
     assert set(holed) == set(Material.__slots__)
@@ -142,13 +142,13 @@ def test_house_json_names_every_field_of_a_material_and_a_lamp() -> None:
     assert lamp["pose"] is None
 
 
-def test_house_json_is_readable_and_says_everything_but_arrays() -> None:
+def test_house_json_is_readable_and_complete_except_for_arrays() -> None:
     text = bundle_from_house(full_house())[1].decode()
     plain = json.loads(text)
     assert plain["classes"] == {"0": "none", "2": "floor", "9": "window", "35": "lamp"}
     assert plain["items"][2]["lights"][0]["power"] == 60.0
     assert plain["items"][2]["class"] == "lamp"
-    assert '"position": [2.0, 2.0, 2.0]' in text  # leaf lists stand on one line
+    assert '"position": [2.0, 2.0, 2.0]' in text  # a list of numbers is on one line
     assert len(text) < 12_000
 
 

@@ -1,4 +1,4 @@
-"""radiance.exr read as one picture: all of its light."""
+"""radiance.exr read as one picture with all of its light."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a file of JSON is refused with: our words, never Python's."""
+"""Refusals of JSON files in our wording, without Python's."""
 
 import json
 
@@ -24,7 +24,7 @@ PYTHONS_WORDS = ("literal", "codec", "integer string", "maximum recursion", "Tra
         (b"", "not valid JSON"),
     ],
 )
-def test_what_is_no_json_is_refused_in_words_that_say_nothing_of_python(data, said):
+def test_invalid_json_is_refused_without_pythons_words(data, said):
     with pytest.raises(BadHouse) as caught:
         json_from_bytes(data, "a.arch.json")
     text = str(caught.value)
@@ -43,7 +43,7 @@ def test_what_is_no_json_is_refused_in_words_that_say_nothing_of_python(data, sa
         lambda inner: st.lists(inner) | st.dictionaries(st.text(), inner),
     )
 )
-def test_pretty_json_says_what_json_says(value):
+def test_pretty_json_equals_json(value):
     text = pretty_json(value)
     assert json.loads(text) == value
     assert "".join(text.split()) == "".join(json.dumps(value, sort_keys=True).split())

@@ -17,7 +17,7 @@ def test_a_long_caption_takes_more_lines_and_loses_nothing_in_the_middle() -> No
     short, long = _sheet("Studio"), _sheet("models of many people " * 4)
     assert short.size[0] == long.size[0]
     assert long.size[1] >= short.size[1] + 3 * 16
-    # The first and the last of its lines carry letters.
+    # Its first and last lines contain letters.
     rows = np.asarray(long.convert("L"), np.int64)[40:].std(1) > 1
     assert rows[:22].any()
     assert rows[-20:].any()

@@ -65,10 +65,10 @@ def test_items_without_a_class_are_listed_with_their_number(tmp_path):
 
 def test_each_class_is_listed_with_the_rule_that_decided_it(tmp_path):
     stats = class_statistics(finished(tmp_path, [half(1, 5)]))
-    found = {d.item or d.source_class: (d.rule, d.n_items) for d in stats.decisions}
-    assert found["Sofa"] == ("name", 1)
-    assert found["eTeks#spaceship"] == ("none", 2)
-    assert found["chair"] == ("source", 1)
+    decided = {d.item or d.source_class: (d.rule, d.n_items) for d in stats.decisions}
+    assert decided["Sofa"] == ("name", 1)
+    assert decided["eTeks#spaceship"] == ("none", 2)
+    assert decided["chair"] == ("source", 1)
     assert "| size | otherprop | 1 | Tray   x |  |" in stats.text()
     assert "5 items: 2 by none" in stats.text()
 
@@ -78,7 +78,7 @@ def test_the_classes_of_a_home_are_listed_without_rendering_it(tmp_path, capsys)
     assert "by source" in capsys.readouterr().out
 
 
-def test_a_folder_without_labels_and_an_impossible_class_are_told(tmp_path):
+def test_a_folder_without_labels_and_an_impossible_class_are_refused(tmp_path):
     (tmp_path / "a/houses").mkdir(parents=True)
     with pytest.raises(BadInput, match="no finished view"):
         class_statistics(tmp_path / "a")
@@ -113,7 +113,7 @@ def test_a_view_without_a_picture_has_no_label_sheet(tmp_path):
         label_sheet(views_of(root)[0])
 
 
-def test_a_name_of_what_has_no_class_is_one_short_line(tmp_path):
+def test_a_name_without_a_class_is_one_short_line(tmp_path):
     root = finished(tmp_path, [half(1, 5)])
     item = {"id": "a", "source_class": "vase\n| forged |" + "x" * 9000, "tags": ["unmapped"]}
     (root / "houses/h/house.json").write_text(json.dumps({"items": [item]}))

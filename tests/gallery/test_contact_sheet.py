@@ -1,4 +1,4 @@
-"""A finished folder becomes a sheet and a gallery that show every view, and say what is missing."""
+"""A finished folder becomes a sheet and a gallery with every view and notes of missing files."""
 
 from __future__ import annotations
 
@@ -34,10 +34,10 @@ def root(tmp_path: Path) -> Path:
 
 
 def test_sheet_is_a_png_with_a_row_for_each_view(root: Path) -> None:
-    one = images.array_from_png(sheet.contact_sheet(root, max_views=1))
+    first = images.array_from_png(sheet.contact_sheet(root, max_views=1))
     four = images.array_from_png(sheet.contact_sheet(root))
-    assert one.shape[1] == four.shape[1]
-    assert four.shape[0] > one.shape[0] + 3 * 60
+    assert first.shape[1] == four.shape[1]
+    assert four.shape[0] > first.shape[0] + 3 * 60
 
 
 def test_a_sheet_leaves_out_the_columns_that_no_view_has(tmp_path: Path) -> None:
@@ -48,7 +48,7 @@ def test_a_sheet_leaves_out_the_columns_that_no_view_has(tmp_path: Path) -> None
     narrow = images.array_from_png(sheet.contact_sheet(tmp_path))
     write_view(views / "0_0_3")
     wide = images.array_from_png(sheet.contact_sheet(tmp_path))
-    # One view has OpenGL's indoor mode, none the other: one column less.
+    # OpenGL's indoor mode exists in one view, and in the other none: one column less.
     assert wide.shape[1] - narrow.shape[1] == sheet.TILE_PX + 6
     assert sheet.modes_text([t for t in TILES if t.name != "opengl_dl"]) == "three lighting modes, "
     assert sheet.modes_text(TILES[4:]) == ""
@@ -65,7 +65,7 @@ def test_views_are_spread_over_houses_and_rooms(root: Path) -> None:
     assert [(v.house.id, v.id) for v in chosen] == [("a", "0_0_1"), ("a", "0_1_0"), ("b", "0_0_4")]
 
 
-def test_a_missing_or_damaged_layer_is_an_empty_tile_that_says_so(tmp_path: Path) -> None:
+def test_a_missing_or_damaged_layer_is_an_empty_tile_with_a_text(tmp_path: Path) -> None:
     write_house(tmp_path, "a", ())
     view = tmp_path / "houses/a/views/0_0_1"
     write_view(view, without=("mlt_ol", "depth"))
@@ -98,9 +98,9 @@ def test_gallery_links_files_that_exist_and_nothing_outside(root: Path) -> None:
 def test_a_page_of_the_gallery_stays_below_five_megabytes(tmp_path: Path) -> None:
     write_house(tmp_path, "a", ())
     for k in range(2):
-        # Pure noise is the worst case there is.
+        # Pure noise is the worst case.
         write_view(tmp_path / f"houses/a/views/0_0_{k}", size=(480, 640))
-    of_a_view = len(gallery(tmp_path).encode()) / 2  # the page's own words counted with each
+    of_a_view = len(gallery(tmp_path).encode()) / 2  # including half of the page's text
     assert of_a_view * gallery_page.PAGE_VIEWS <= gallery_page.MAX_PAGE_BYTES
     worst = gallery_page.PAGE_VIEWS * len(TILES) * (MAX_TILE_BYTES * 4 / 3 + 600)
     assert worst <= gallery_page.MAX_PAGE_BYTES
@@ -124,18 +124,18 @@ def test_the_gallery_has_as_many_pages_as_it_needs_and_links_them(
     assert len(set(links)) == len(links) == 4
 
 
-def test_a_gallery_of_one_page_has_no_pages_to_turn(root: Path) -> None:
+def test_a_gallery_of_one_page_has_no_page_links(root: Path) -> None:
     assert "<nav" not in gallery(root)
 
 
 def test_gallery_embeds_thumbnails_no_larger_than_320(tmp_path: Path) -> None:
     write_house(tmp_path, "a", ())
     write_view(tmp_path / "houses/a/views/0_0_1", size=(480, 640))
-    found = re.findall(r'src="data:image/\w+;base64,([^"]+)"', gallery(tmp_path))
-    pictures = [base64.b64decode(text) for text in found]
+    thumbnails = re.findall(r'src="data:image/\w+;base64,([^"]+)"', gallery(tmp_path))
+    pictures = [base64.b64decode(text) for text in thumbnails]
     assert len(pictures) == len(TILES)
     for data in pictures:
-        # Pure noise is the worst case there is: it too stays within the budget.
+        # Pure noise is the worst case: it too stays within the budget.
         assert len(data) <= MAX_TILE_BYTES
         assert max(Image.open(io.BytesIO(data)).size) <= 320
 
@@ -167,18 +167,20 @@ def test_a_home_or_room_called_script_is_escaped_everywhere(tmp_path: Path) -> N
 
 def test_nyu40_colours_are_distinct() -> None:
     table = NYU40_COLOURS.astype(int)
-    apart = np.abs(table[:, None] - table[None]).sum(2) + 999 * np.eye(41, dtype=int)
+    distances = np.abs(table[:, None] - table[None]).sum(2) + 999 * np.eye(41, dtype=int)
     assert table.shape == (41, 3)
-    assert apart.min() >= 48
+    assert distances.min() >= 48
 
 
-def test_a_black_picture_says_that_no_light_came(root: Path) -> None:
+def test_a_black_picture_is_labelled_as_unlit(root: Path) -> None:
     folder = root / "houses/a/views/0_0_1"
     black = images.png_from_array(np.zeros((60, 80, 3), np.uint8))
     for mode in ("mlt_ol", "mlt_il_ol"):
         (folder / f"{mode}.png").write_bytes(black)
-    one, other = (view_tiles.tiles_of(view) for view in views_of(root)[:2])
-    notes = [{t.kind.name: t.note for t in tiles if t.kind.is_photo} for tiles in (one, other)]
+    black_tiles, bright = (view_tiles.tiles_of(view) for view in views_of(root)[:2])
+    notes = [
+        {t.kind.name: t.note for t in tiles if t.kind.is_photo} for tiles in (black_tiles, bright)
+    ]
     dark = {"mlt_ol": "no daylight", "mlt_il_ol": "no light"}
     assert notes == [dict.fromkeys(notes[1], "") | dark, dict.fromkeys(notes[1], "")]
 
@@ -242,7 +244,7 @@ def test_a_letter_that_no_font_has_is_a_question_mark() -> None:
     assert "".join(part for _font, part in sheet_text.runs_of_one_font("a\u0378b\ufe0f")) == "a?b"
 
 
-def test_gallery_shows_what_selection_kept_and_rejected(root: Path) -> None:
+def test_gallery_shows_kept_and_rejected_views(root: Path) -> None:
     assert 'id="verdict"' not in gallery(root)
     (root / "selection").mkdir()
     (root / "selection.json").write_text('{"run": "nyu"}')
@@ -269,22 +271,20 @@ def test_the_frame_of_a_missing_tile_stays_in_its_row():
     )
 
 
-def test_the_best_room_is_shown_first_and_one_that_daylight_leaves_black_last(
-    tmp_path: Path,
-) -> None:
-    told = {
+def test_the_best_room_is_first_and_one_without_daylight_last(tmp_path: Path) -> None:
+    marks = {
         "0_0_1": {"room": "0_0", "score": 1.2, "modes": {"light": {"floor_lux": {"outdoor": 0.0}}}},
         "0_1_0": {"room": "0_1", "score": 0.4},
         "0_2_0": {"room": "0_2", "score": 0.3},
         "0_2_5": {"room": "0_2", "score": 0.9},
     }
-    write_house(tmp_path, "a", tuple(told))
-    for view, facts in told.items():
+    write_house(tmp_path, "a", tuple(marks))
+    for view, facts in marks.items():
         (tmp_path / f"houses/a/views/{view}/view.json").write_text(json.dumps(facts))
     ordered = [v.id for v in gallery_page.best_first(views_of(tmp_path))]
     assert ordered == ["0_2_5", "0_2_0", "0_1_0", "0_0_1"]
     # Frames of a walk stay in order.
-    for k, view in enumerate(told):
+    for k, view in enumerate(marks):
         facts = {"room": "walk", "frame": k, "score": k}
         (tmp_path / f"houses/a/views/{view}/view.json").write_text(json.dumps(facts))
-    assert [v.id for v in gallery_page.best_first(views_of(tmp_path))] == list(told)
+    assert [v.id for v in gallery_page.best_first(views_of(tmp_path))] == list(marks)

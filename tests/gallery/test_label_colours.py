@@ -1,4 +1,4 @@
-"""Every layer of the table is drawn, as its row says."""
+"""Every layer of the table is drawn according to its row."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ SHOWN = [layer for layer in LAYERS if layer.shown_as]
 
 
 def stored(layer: Layer) -> np.ndarray:
-    """An array of the layer's type: small numbers, and a pixel that sees nothing."""
+    """An array of the layer's type: small numbers, and a pixel without a surface."""
     n = 3 if layer.channels == "RGB" else len(layer.channels.split())
     array = np.random.default_rng(0).integers(0, 200, (6, 8, n)).astype(layer.dtype)
     array[0, 0] = 0
@@ -39,7 +39,7 @@ def test_near_is_pale_in_depth_and_in_disparity() -> None:
     assert disparity[0, 0].sum() > disparity[0, 1].sum()
 
 
-def test_a_layer_of_a_plugin_that_says_nothing_is_scaled_to_its_range() -> None:
+def test_a_plugins_layer_without_a_drawing_is_scaled_to_its_range() -> None:
     layer = optional_layer("height", "Y", "uint16", "mm")
     pixels = shown_colours(layer, np.array([[100, 200, 300]], np.uint16))
     assert pixels[0, :, 0].tolist() == [0, 128, 255]

@@ -1,4 +1,4 @@
-"""Made homes in a folder: whole, looked at, kept, never written over."""
+"""Generated homes in a folder: complete, inspected, kept, never overwritten."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_homes_and_their_plans_lie_in_the_folder(tmp_path: Path) -> None:
     assert (tmp_path / "plans.html").read_text().count("<figure>") == 2
 
 
-def test_a_second_call_keeps_what_is_there(tmp_path: Path) -> None:
+def test_a_second_call_keeps_existing_homes(tmp_path: Path) -> None:
     list(make_homes(HOMES[:1], tmp_path))
     before = (tmp_path / "made-1.sh3d").stat().st_mtime_ns
     assert [done.is_new for done in make_homes(HOMES, tmp_path)] == [False, True]
@@ -44,7 +44,7 @@ def test_a_file_of_another_home_is_not_written_over(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_two_processes_write_what_one_does(tmp_path: Path) -> None:
+def test_two_processes_write_the_files_of_one(tmp_path: Path) -> None:
     for name in "ab":
         (tmp_path / name).mkdir()
     list(make_homes(HOMES, tmp_path / "a"))

@@ -1,4 +1,4 @@
-"""What is made of a sheet ahead, view by view, is what the sheet would make."""
+"""Parts of a sheet prepared view by view equal those of the sheet."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Films of a sequence: as many frames as it has, at its pace, and the same each time."""
+"""Films of a sequence: all its frames, at its pace, and reproducible."""
 
 import io
 import json
@@ -17,7 +17,7 @@ from pbrs_farm.images import png_from_array
 
 
 def frames(folder: Path, n: int = 4, *, with_picture: bool = True) -> list[ViewEntry]:
-    """Frames of a square that wanders, 10 a second, the last first."""
+    """Frames of a moving square, 10 a second, the last one first."""
     house = OutputHouse("home-1", "Home", "")
     entries = []
     for k in reversed(range(n)):
@@ -41,8 +41,8 @@ def decoded(data: bytes) -> tuple[list[np.ndarray], Fraction]:
 
 
 def test_a_film_has_every_frame_in_time_at_its_pace(tmp_path: Path) -> None:
-    (own,) = sequences_of(frames(tmp_path)).values()
-    pictures, rate = decoded(films_of(own)["picture"])
+    (sequence,) = sequences_of(frames(tmp_path)).values()
+    pictures, rate = decoded(films_of(sequence)["picture"])
     assert (len(pictures), rate) == (4, 10)
     assert pictures[0].shape == (48, 64, 3)
     # The square moves 4 px a frame.
@@ -50,9 +50,9 @@ def test_a_film_has_every_frame_in_time_at_its_pace(tmp_path: Path) -> None:
     np.testing.assert_allclose(np.diff(middles), 4, atol=0.6)
 
 
-def test_labels_lie_beside_the_picture_in_two_rows_of_three(tmp_path: Path) -> None:
-    (own,) = sequences_of(frames(tmp_path)).values()
-    pictures, _rate = decoded(films_of(own)["labels"])
+def test_labels_are_beside_the_picture_in_two_rows_of_three(tmp_path: Path) -> None:
+    (sequence,) = sequences_of(frames(tmp_path)).values()
+    pictures, _rate = decoded(films_of(sequence)["labels"])
     assert pictures[0].shape == (96, 192, 3)
 
 
@@ -63,10 +63,10 @@ def test_the_same_frames_give_the_same_film() -> None:
     assert decoded(first)[0][0].shape == (32, 46, 3)
 
 
-def test_frames_without_a_picture_are_told(tmp_path: Path) -> None:
-    (own,) = sequences_of(frames(tmp_path, with_picture=False)).values()
+def test_frames_without_a_picture_are_reported(tmp_path: Path) -> None:
+    (sequence,) = sequences_of(frames(tmp_path, with_picture=False)).values()
     with pytest.raises(BadInput, match="no picture to film"):
-        films_of(own)
+        films_of(sequence)
 
 
 def test_single_views_are_no_sequence(tmp_path: Path) -> None:

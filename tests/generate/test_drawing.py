@@ -1,4 +1,4 @@
-"""Drawn floor plans: rules that every one of them meets."""
+"""Rules that every drawn floor plan satisfies."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def test_the_same_seed_gives_the_same_plan() -> None:
 @pytest.mark.parametrize("seed", SEEDS)
 def test_rooms_overlap_neither_another_nor_a_wall(seed: int) -> None:
     rooms = [Polygon(room.polygon) for room in plan(seed).rooms]
-    # Walls that meet at a slant are mitred: drawn out, their ends would stand in a room.
+    # Walls that meet at a slant are mitred: unmitred, their ends would reach into a room.
     has_slants = any(min(map(abs, wall.normal)) > 1e-6 for wall in plan(seed).walls)
     ends = {"to_start": not has_slants, "to_end": not has_slants}
     walls = unary_union([Polygon(wall.corners(**ends)) for wall in plan(seed).walls])
@@ -46,7 +46,7 @@ def test_every_room_is_reached_from_the_entrance(seed: int) -> None:
     drawn = plan(seed)
     hall = next(i for i, room in enumerate(drawn.rooms) if room.type is RoomType.HALL)
     assert [o.room for o in drawn.openings if o.kind is OpeningKind.ENTRANCE] == [hall]
-    # Walk through doors, and from the living room into a kitchen without a wall between.
+    # Walk through doors, and from the living room into an open kitchen.
     joined = [{o.room, o.other} for o in drawn.openings if o.other is not None]
     living = next(
         i for i, r in enumerate(drawn.rooms) if r.type in (RoomType.LIVING, RoomType.STUDIO)

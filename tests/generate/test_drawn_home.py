@@ -32,7 +32,7 @@ def test_the_same_seed_gives_the_same_home() -> None:
 
 
 def _rooms(home: DrawnHome) -> list[tuple[PlanRoom, set[str]]]:
-    """Each room with the groups of what stands in it."""
+    """Each room with the groups of its furniture."""
     return [
         (room, {p.piece.group for p in storey.pieces if p.room == number})
         for storey in home.storeys
@@ -56,7 +56,7 @@ def test_an_office_is_a_small_bedroom_with_a_desk_for_a_bed(storeys: int) -> Non
     assert max(room.area for room in bedrooms) >= office.area
 
 
-def test_offices_leave_the_largest_bedroom_and_have_names_of_their_own() -> None:
+def test_offices_leave_the_largest_bedroom_and_have_distinct_names() -> None:
     wishes = Wishes((3, 3), offices=2)
     home = drawn_home(np.random.default_rng(6), plain_catalogue(), wishes=wishes)
     rooms = [room for room, _ in _rooms(home)]
@@ -65,16 +65,16 @@ def test_offices_leave_the_largest_bedroom_and_have_names_of_their_own() -> None
 
 
 def _row_of_rooms(*rooms: tuple[RoomType, float]) -> Plan:
-    """Rooms of these widths beside each other, 3 m deep; a bathroom is entered from the room before it."""
-    found, doors, x = [], [], 0.0
+    """Rooms of these widths in a row, 3 m deep; a bathroom is entered from the previous room."""
+    plan_rooms, doors, x = [], [], 0.0
     for number, (type_, width) in enumerate(rooms):
         polygon = ((x, 0.0), (x + width, 0.0), (x + width, 3.0), (x, 3.0))
-        found.append(PlanRoom(type_, f"{type_.label} {number}", polygon))
+        plan_rooms.append(PlanRoom(type_, f"{type_.label} {number}", polygon))
         x += width
         if type_ is RoomType.BATHROOM:
             door = PlanOpening(OpeningKind.DOOR, 0, 1.0, 0.8, 2.1, 0.0, number, number - 1)
             doors.append(door)
-    return Plan(tuple(found), (), tuple(doors), 2.5)
+    return Plan(tuple(plan_rooms), (), tuple(doors), 2.5)
 
 
 def _offices_of(n: int, *storeys: Plan) -> dict[tuple[int, int], str]:
@@ -90,10 +90,10 @@ def test_the_smallest_bedrooms_become_offices_first_those_without_a_bathroom() -
     bed, bath = RoomType.BEDROOM, RoomType.BATHROOM
     plan = _row_of_rooms((bed, 5), (bed, 3), (bath, 2), (bed, 4))
     assert _offices_of(0, plan) == {}
-    # The smallest has a bathroom of its own.
+    # The smallest has an ensuite bathroom.
     assert _offices_of(1, plan) == {(0, 3): "Office"}
     assert _offices_of(2, plan) == {(0, 1): "Office 1", (0, 3): "Office 2"}
-    # The largest bedroom stays, also where it alone has no bathroom.
+    # The largest bedroom stays, also if it is the only one without a bathroom.
     largest_first = _row_of_rooms((bed, 3), (bath, 2), (bed, 5))
     assert _offices_of(1, largest_first) == {(0, 0): "Office"}
     upstairs = _row_of_rooms((bed, 2.5), (bed, 6))

@@ -1,4 +1,4 @@
-"""What rooms of Swiss Dwellings are for, where the table says NOT_DEFINED of all of them."""
+"""Room types of Swiss Dwellings whose areas are all NOT_DEFINED in the table."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ Rect = tuple[float, float, float, float]  # x0, z0, x1, z1
 COLUMNS = (
     "apartment_id", "floor_id", "entity_type", "entity_subtype", "geometry", "elevation", "height",
 )  # fmt: skip
-# Walls of 0.2 m between; a corridor in the middle, rooms above and below it, a balcony before them.
+# Walls of 0.2 m; a corridor in the middle, rooms above and below it, a balcony in front of them.
 AREAS: dict[str, Rect] = {
     "living": (0, 0, 6, 4), "bedroom 1": (6.2, 0, 9, 4), "bedroom 2": (9.2, 0, 11.2, 4),
     "corridor": (0, 4.2, 11.2, 5.6), "kitchen": (0, 5.8, 3, 9), "bath": (3.2, 5.8, 5.4, 9),
@@ -28,7 +28,7 @@ TYPES = {
 FEATURES: dict[str, Rect] = {
     "KITCHEN": (0.1, 8.3, 2.9, 8.9), "BATHTUB": (3.3, 8.2, 5.0, 8.9), "TOILET": (6.0, 8.2, 6.4, 8.9),
 }  # fmt: skip
-# Bedroom 1 has the balcony's door alone, bedrooms 2 and 3 (8 and 8.3 m2) a window.
+# Bedroom 1 has only the balcony's door, bedrooms 2 and 3 (8 and 8.3 m2) a window.
 DOORS: list[tuple[float, float]] = [
     (3, 4.1), (7.6, 4.1), (10.2, 4.1), (1.5, 5.7), (4.3, 5.7), (6.2, 5.7), (7.7, 5.7), (9.9, 5.7),
     (7.6, -0.1), (2, -0.1),
@@ -47,7 +47,7 @@ def wkt(box: Rect) -> str:
 
 @pytest.fixture
 def table(tmp_path: Path) -> Path:
-    """An apartment of eleven areas, of which no word says what they are for."""
+    """An apartment of eleven areas without a word for their use."""
     rows = [("area", "NOT_DEFINED", box) for box in AREAS.values()]
     rows += [("feature", word, box) for word, box in FEATURES.items()]
     rows += [("opening", "DOOR", (x - 0.4, z - 0.1, x + 0.4, z + 0.1)) for x, z in DOORS]
@@ -62,15 +62,15 @@ def table(tmp_path: Path) -> Path:
     return path
 
 
-def test_areas_without_a_word_go_by_fixtures_railings_windows_and_doors(table: Path) -> None:
+def test_unnamed_areas_are_typed_by_fixtures_railings_windows_and_doors(table: Path) -> None:
     plan = plan_from_file(table).plan
-    found = {}
+    types = {}
     for name, (x0, z0, x1, z1) in AREAS.items():
         # The plan's origin is the corner of all rooms, (0, -2) here.
         middle = (x0 + x1) / 2, (z0 + z1) / 2 + 2
         (room,) = (r for r in plan.rooms if r.contains(middle))
-        found[name] = room.type.value
-    assert found == TYPES
+        types[name] = room.type.value
+    assert types == TYPES
 
 
 def test_a_railing_along_a_stairwell_makes_no_balcony_of_a_room(table: Path) -> None:

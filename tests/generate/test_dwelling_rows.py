@@ -1,4 +1,4 @@
-"""Rows of a table of dwellings: an apartment becomes a plan by the door of plans of one's own."""
+"""Rows of a table of dwellings: an apartment becomes a plan through the reader of own plans."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def area(kind: str, wkt: str, apartment: str = "a1", floor: str = "7") -> tuple[
     return apartment, floor, "area", kind, wkt, 404.0, 2.6
 
 
-# North of a corridor a large and a small room, a bathroom beside; walls of 0.2 m between.
+# North of a corridor a large and a small room, with a bathroom beside them; walls of 0.2 m.
 ROWS: list[tuple[Any, ...]] = [
     area("ROOM", rect(10, 21.7, 5, 4)),
     area("ROOM", rect(15.2, 21.7, 3, 4)),
@@ -63,17 +63,15 @@ def plan(
 def test_an_apartments_areas_are_rooms_and_its_largest_plain_room_is_to_live_in(
     tmp_path: Path,
 ) -> None:
-    found = plan(tmp_path)
-    types = [room.type for room in found.plan.rooms]
+    drawn = plan(tmp_path)
+    types = [room.type for room in drawn.plan.rooms]
     assert types == [RoomType.LIVING, RoomType.BEDROOM, RoomType.HALL, RoomType.BATHROOM]
-    assert found.plan.rooms[0].area == pytest.approx(20, abs=0.05)
-    assert found.plan.height == 2.6
-    assert found.left_out == ()
+    assert drawn.plan.rooms[0].area == pytest.approx(20, abs=0.05)
+    assert drawn.plan.height == 2.6
+    assert drawn.left_out == ()
 
 
-def test_north_is_up_on_the_page_and_only_openings_beside_the_apartment_count(
-    tmp_path: Path,
-) -> None:
+def test_north_is_up_on_the_page_and_only_the_apartments_openings_count(tmp_path: Path) -> None:
     entrance, door, window = plan(tmp_path).plan.openings
     assert (entrance.kind, entrance.other) == (OpeningKind.ENTRANCE, None)
     assert {door.room, door.other} == {0, 2}
@@ -82,11 +80,11 @@ def test_north_is_up_on_the_page_and_only_openings_beside_the_apartment_count(
     assert (window.sill, window.height, window.width) == pytest.approx((0.9, 1.4, 1.6))
 
 
-def test_an_opening_that_fits_no_wall_is_left_out_and_told(tmp_path: Path) -> None:
+def test_an_opening_that_fits_no_wall_is_dropped_with_a_note(tmp_path: Path) -> None:
     wide = ("", "7", "opening", "WINDOW", rect(10.2, 25.7, 7.9, 0.3), 404.9, 1.4)
-    found = plan(tmp_path, [*ROWS, wide])
-    assert len(found.plan.openings) == 3
-    assert "wider than its wall" in found.left_out[0]
+    drawn = plan(tmp_path, [*ROWS, wide])
+    assert len(drawn.plan.openings) == 3
+    assert "wider than its wall" in drawn.left_out[0]
 
 
 def test_the_home_of_an_apartment_reads_as_a_house(tmp_path: Path) -> None:
@@ -104,7 +102,7 @@ def test_the_home_of_an_apartment_reads_as_a_house(tmp_path: Path) -> None:
         ([area("SHAFT", rect(0, 0, 1, 1))], "a1", "without rooms"),
     ],
 )
-def test_a_table_without_such_an_apartment_is_one_line(
+def test_a_table_without_the_apartment_is_refused(
     tmp_path: Path, rows: list[tuple[Any, ...]], apartment: str, message: str
 ) -> None:
     with pytest.raises(BadInput, match=message) as caught:
@@ -112,12 +110,12 @@ def test_a_table_without_such_an_apartment_is_one_line(
     assert "\n" not in str(caught.value)
 
 
-def test_a_table_of_something_else_is_one_line(tmp_path: Path) -> None:
+def test_a_table_of_another_kind_is_refused(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="has no column entity_type"):
         plan_from_file(written(tmp_path, [(1, 2)], ("price", "rent")))
 
 
-def test_an_apartment_is_asked_of_a_table_alone(tmp_path: Path) -> None:
+def test_an_apartment_is_valid_only_for_a_table(tmp_path: Path) -> None:
     path = tmp_path / "plan.json"
     path.write_text("{}")
     with pytest.raises(BadInput, match=r"names a row of a \.csv"):
@@ -126,8 +124,8 @@ def test_an_apartment_is_asked_of_a_table_alone(tmp_path: Path) -> None:
 
 def test_the_floors_of_an_apartment_are_storeys(tmp_path: Path) -> None:
     upper = ("a1", "8", "area", "ROOM", rect(10, 21, 5, 4), 407.0, 2.4)
-    found = plan(tmp_path, [upper, *ROWS])
-    assert [s.plan.height for s in found.storeys] == [2.6, 2.4]
+    drawn = plan(tmp_path, [upper, *ROWS])
+    assert [s.plan.height for s in drawn.storeys] == [2.6, 2.4]
     path = tmp_path / "geometries.csv"
     assert len(plan_from_file(path, Part("a1", 1)).storeys) == 1
     with pytest.raises(BadInput, match="has 2 storeys, no floor 2"):

@@ -1,4 +1,4 @@
-"""Where a placed piece's front and corners are."""
+"""Front and corners of a placed piece."""
 
 import math
 
@@ -22,5 +22,5 @@ def test_a_piece_that_is_not_turned_looks_down_the_page() -> None:
 def test_a_quarter_turn_clockwise_makes_it_look_to_the_left() -> None:
     placed = _placed(math.pi / 2)
     assert placed.front == pytest.approx((-1, 0))
-    # Its back left corner is on the page's right side now.
+    # Its back left corner is now on the page's right side.
     assert placed.corners[0] == pytest.approx((3.5, 3.0))

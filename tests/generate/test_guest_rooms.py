@@ -1,4 +1,4 @@
-"""Small rooms cut from larger ones: strips and corners that leave both what they need."""
+"""Small rooms cut from larger ones: strips and corners that leave both a valid size."""
 
 from __future__ import annotations
 
@@ -30,12 +30,12 @@ def area(rects: tuple[IntRect, ...]) -> float:
 
 
 @pytest.mark.parametrize("type_", [RoomType.STORE, RoomType.WARDROBE, RoomType.WC])
-def test_a_guest_and_what_it_leaves_are_its_hosts_floor(type_: RoomType) -> None:
+def test_a_guest_and_the_rest_of_its_host_fill_the_hosts_floor(type_: RoomType) -> None:
     uncut, parts = cut(RoomWish(type_, 2.4))
     assert uncut == set()
     (guest,) = parts[2]
     assert area(parts[1]) + area(parts[2]) == pytest.approx(area((BEDROOM,)))
-    # The walls around it take their share.
+    # The walls around it reduce its area.
     assert 2.4 <= area(parts[2]) <= 2.4 * 1.45
     assert any(shared_length(guest, rest) > 0 for rest in parts[1])
 
@@ -53,7 +53,7 @@ def test_a_room_too_small_for_a_guest_keeps_its_floor() -> None:
     assert parts[1] == (small,)
 
 
-def test_what_lies_beside_a_certain_room_is_cut_from_none() -> None:
+def test_a_room_that_must_adjoin_another_is_cut_from_none() -> None:
     rooms = (
         RoomWish(RoomType.LIVING, 30), RoomWish(RoomType.KITCHEN, 9), RoomWish(RoomType.STORE, 2),
         RoomWish(RoomType.BATHROOM, 6), RoomWish(RoomType.HALL, 8),
@@ -64,6 +64,6 @@ def test_what_lies_beside_a_certain_room_is_cut_from_none() -> None:
 
 @pytest.mark.parametrize("area", [10.0, 17.0, 23.2, 45.0])
 def test_the_wall_that_a_room_is_promised_holds_its_glass(area: float) -> None:
-    # A French window of 2.1 m between the outer walls' halves, 35 cm from either.
+    # A French window of 2.1 m between the halves of the outer walls, 35 cm from each.
     width = daylight_m(area) - 0.26 - 2 * 0.35
     assert width * 2.1 >= area / 8

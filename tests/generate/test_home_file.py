@@ -1,4 +1,4 @@
-"""Home files of plans: the ordinary reader and repair take them whole."""
+"""Home files of plans pass the ordinary reader and repair without loss."""
 
 from __future__ import annotations
 
@@ -118,7 +118,7 @@ def test_a_lamp_hangs_from_the_ceiling_with_its_light_and_glass() -> None:
     assert MaterialKind.GLASS in kinds
 
 
-def test_the_file_says_whose_models_it_holds() -> None:
+def test_the_file_credits_the_authors_of_its_models() -> None:
     placed = PlacedPiece(LAMP, 1, 1, 0, 0, 0.4, 0.4, 0.5, room=0)
     data = written(0, (placed,), lamp_catalogue())
     with zipfile.ZipFile(io.BytesIO(data)) as archive:

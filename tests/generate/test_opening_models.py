@@ -1,4 +1,4 @@
-"""Generated doors: what one sees through a shut one."""
+"""Generated doors: the view through a shut one."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def test_no_light_comes_round_a_shut_leaf(leaf: str, kind: OpeningKind, gap_m: f
     door = PlanOpening(kind, 0, 1.0, WIDTH, HEIGHT, 0.0, 0)
     shape = opening_model(door, 0.26, OpeningDesign(leaf=leaf, entrance=leaf))
     corners = np.concatenate([triangle_corners(s.positions, s.faces) for s in shape.surfaces])
-    # As seen along the wall's normal: rooms inside have a gap above the floor, nothing else.
+    # Along the wall's normal: inner doors have a gap above the floor, others none.
     covered = shapely.union_all(shapely.polygons(corners[:, :, :2].astype(np.float64)))
     open_part = shapely.box(-WIDTH / 2, 0.0, WIDTH / 2, HEIGHT).difference(covered.buffer(1e-5))
     assert open_part.area == pytest.approx(gap_m * WIDTH, rel=0.2, abs=1e-4)

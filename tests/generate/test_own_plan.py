@@ -1,4 +1,4 @@
-"""A plan of one's own: room polygons become walls that close, doors and windows find theirs."""
+"""A user's plan: room polygons become closed walls, doors and windows find their walls."""
 
 from __future__ import annotations
 
@@ -84,13 +84,13 @@ def test_the_home_of_a_plan_is_closed(tmp_path: Path, value: object) -> None:
 
 
 def test_doors_join_rooms_and_windows_look_out(tmp_path: Path) -> None:
-    found = plan(tmp_path, TOUCHING)
-    entrance, first, _second, window, _other = found.openings
+    drawn = plan(tmp_path, TOUCHING)
+    entrance, first, _second, window, _other = drawn.openings
     assert (entrance.kind, entrance.other) == (OpeningKind.ENTRANCE, None)
-    assert {found.rooms[r or 0].type for r in (first.room, first.other)} == {
+    assert {drawn.rooms[r or 0].type for r in (first.room, first.other)} == {
         RoomType.LIVING, RoomType.HALL,
     }  # fmt: skip
-    assert (window.other, found.walls[window.wall].is_outer) == (None, True)
+    assert (window.other, drawn.walls[window.wall].is_outer) == (None, True)
 
 
 def test_walls_take_the_room_between_rooms(tmp_path: Path) -> None:
@@ -100,19 +100,19 @@ def test_walls_take_the_room_between_rooms(tmp_path: Path) -> None:
     assert rooms[0].area == pytest.approx(4.9 * 3.9, abs=0.01)
 
 
-def test_geojson_says_the_same(tmp_path: Path) -> None:
+def test_geojson_gives_the_same_plan(tmp_path: Path) -> None:
     rooms = [
         {"properties": {"type": r["type"], "name": r.get("name")},
          "geometry": {"type": "Polygon", "coordinates": [[*r["polygon"], r["polygon"][0]]]}}
         for r in TOUCHING["rooms"]
     ]  # fmt: skip
     points = [
-        {"properties": {"kind": kind}, "geometry": {"type": "Point", "coordinates": at}}
-        for kind, at in (("entrance", [0, 4.7]), ("door", [2, 4]), ("window", [6.5, 0]))
+        {"properties": {"kind": kind}, "geometry": {"type": "Point", "coordinates": coordinates}}
+        for kind, coordinates in (("entrance", [0, 4.7]), ("door", [2, 4]), ("window", [6.5, 0]))
     ]
-    found = plan(tmp_path, {"type": "FeatureCollection", "features": rooms + points})
-    assert found.walls == plan(tmp_path, TOUCHING).walls
-    assert [o.kind.value for o in found.openings] == ["entrance", "door", "window"]
+    drawn = plan(tmp_path, {"type": "FeatureCollection", "features": rooms + points})
+    assert drawn.walls == plan(tmp_path, TOUCHING).walls
+    assert [o.kind.value for o in drawn.openings] == ["entrance", "door", "window"]
 
 
 def test_a_turned_plan_is_turned_back(tmp_path: Path) -> None:
@@ -125,8 +125,8 @@ def test_a_turned_plan_is_turned_back(tmp_path: Path) -> None:
     walls = tuple(PlanWall(at(w.start), at(w.end), w.thickness) for w in upright.walls)
     rooms = tuple(PlanRoom(r.type, r.name, tuple(map(at, r.polygon))) for r in upright.rooms)
     back = turned_upright(Plan(rooms, walls, upright.openings, 2.5))
-    for one, other in zip(back.walls, upright.walls, strict=True):
-        np.testing.assert_allclose(one.start, other.start, atol=0.02)
+    for turned_wall, upright_wall in zip(back.walls, upright.walls, strict=True):
+        np.testing.assert_allclose(turned_wall.start, upright_wall.start, atol=0.02)
 
 
 @pytest.mark.parametrize(
@@ -160,7 +160,7 @@ def test_a_turned_plan_is_turned_back(tmp_path: Path) -> None:
         (GEOJSON | {"features": [HATCH]}, "feature 1, kind: expected 'door'"),
     ],
 )
-def test_a_plan_that_cannot_be_built_is_one_line(
+def test_a_plan_that_cannot_be_built_is_refused(
     tmp_path: Path, value: object, message: str
 ) -> None:
     with pytest.raises(BadInput, match=message) as caught:

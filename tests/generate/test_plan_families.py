@@ -8,13 +8,13 @@ import pytest
 from pbrs_farm.core.made_home import PLANS
 from pbrs_farm.generate.drawn_plan import drawn_plan
 from pbrs_farm.generate.floor_plan import RoomType
-from pbrs_farm.generate.layout import _easier
+from pbrs_farm.generate.layout import easier_programmes
 from pbrs_farm.generate.plan_families import plan_families
 from pbrs_farm.generate.programme import Programme, RoomWish, Wishes
 from pbrs_farm.generate.slicing_goals import Brief, IntRect, Rules, SliceLeaf
 
 
-def test_every_family_that_a_word_may_name_is_drawn_by_one_seed_in_twenty_or_more() -> None:
+def test_every_family_with_a_name_is_drawn_by_at_least_one_seed_in_twenty() -> None:
     families = plan_families()
     assert set(families) == set(PLANS)
     assert sum(family.weight for family in families.values()) == pytest.approx(1.0)
@@ -35,7 +35,7 @@ def test_a_window_and_a_door_fit_below_the_lowest_ceiling_of_their_family() -> N
 
 def test_a_home_without_place_for_its_court_is_tried_with_a_corner_left_out() -> None:
     wishes = (RoomWish(RoomType.LIVING, 20.0), RoomWish(RoomType.HALL, 6.0))
-    steps = _easier(Programme(wishes, notch=8.0, is_court=True))
+    steps = easier_programmes(Programme(wishes, notch=8.0, is_court=True))
     assert [(p.notch > 0, p.is_court) for _, p in steps[:3]] == [
         (True, True), (True, False), (False, False),
     ]  # fmt: skip
@@ -63,7 +63,7 @@ def test_where_there_is_no_living_room_bedrooms_are_entered_from_the_hall() -> N
         ((60, 0, 100, 40), True),  # in the middle of a side
         ((0, 0, 60, 40), False),  # in a corner
         ((60, 60, 100, 100), False),  # inside
-        ((60, 0, 130, 40), False),  # an arm of 1.5 m beside it
+        ((60, 0, 130, 40), False),  # with an arm of 1.5 m beside it
     ],
 )
 def test_a_court_leaves_out_the_middle_of_one_side(court: IntRect, *, fits: bool) -> None:

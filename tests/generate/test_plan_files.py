@@ -1,4 +1,4 @@
-"""One home in each format of floor plans: the same rooms, openings and things; faults are one line."""
+"""One home in each format of floor plans: the same rooms, openings and furniture; faults are one line."""
 
 from __future__ import annotations
 
@@ -54,14 +54,14 @@ def test_every_format_gives_the_same_rooms(tmp_path: Path, name: str) -> None:
         x0, z0, x1, z1 = sample.box
         middle = Point((x0 + x1) / 2, (z0 + z1) / 2)
         near = [r for r in plan.rooms if Polygon(r.polygon).distance(middle) < 0.3]
-        # ProcTHOR knows four types of rooms, and no hall.
-        wanted = {sample.type} | ({"living"} if name == "procthor" else set())
-        assert {r.type.value for r in near} <= wanted
+        # ProcTHOR has four types of rooms, and no hall.
+        expected = {sample.type} | ({"living"} if name == "procthor" else set())
+        assert {r.type.value for r in near} <= expected
         assert near[0].area == pytest.approx((x1 - x0) * (z1 - z0), rel=0.18)
 
 
 @formats
-def test_every_opening_is_kept_where_it_is(tmp_path: Path, name: str) -> None:
+def test_every_opening_keeps_its_place(tmp_path: Path, name: str) -> None:
     plan = read(name, tmp_path).plan
     assert len(plan.openings) == len(HOLES)
     shift = (
@@ -69,18 +69,16 @@ def test_every_opening_is_kept_where_it_is(tmp_path: Path, name: str) -> None:
         min(z for r in plan.rooms for _, z in r.polygon),
     )
     for hole in HOLES:
-        at = np.array(hole.at) + shift
-        near = min(plan.openings, key=lambda o: math.dist(plan.walls[o.wall].at(o.along), at))
-        assert math.dist(plan.walls[near.wall].at(near.along), at) < 0.3
+        middle = np.array(hole.at) + shift
+        near = min(plan.openings, key=lambda o: math.dist(plan.walls[o.wall].at(o.along), middle))
+        assert math.dist(plan.walls[near.wall].at(near.along), middle) < 0.3
         assert near.width == pytest.approx(hole.width, abs=0.02)
         assert (near.kind is OpeningKind.WINDOW) == (hole.kind == "window")
         assert (near.other is None) == (len(hole.rooms) == 1)
 
 
 @fronts
-def test_things_stand_where_they_are_told_and_look_where_they_are_told(
-    tmp_path: Path, name: str
-) -> None:
+def test_furniture_has_the_place_and_direction_of_the_file(tmp_path: Path, name: str) -> None:
     things = read(name, tmp_path).storeys[0].things
     for thing in things:
         sample = min(THINGS, key=lambda t: math.dist(t.at, (thing.x, thing.z)))
@@ -93,20 +91,20 @@ def test_things_stand_where_they_are_told_and_look_where_they_are_told(
 
 
 def test_a_left_handed_house_is_mirrored_once(tmp_path: Path) -> None:
-    """A bathtub to the lower right of the page stands there, and faces up the page."""
+    """A bathtub to the lower right of the page is there, and faces up the page."""
     (tub,) = (t for t in read("procthor", tmp_path).storeys[0].things if t.name == "Bathtub")
     assert (tub.x, tub.z) == pytest.approx((7.4, 8.55))
     assert (math.sin(tub.turn_rad), math.cos(tub.turn_rad)) == pytest.approx((0, -1), abs=1e-6)
 
 
-def test_slivers_are_told_and_undefined_areas_go_by_their_fixtures(tmp_path: Path) -> None:
-    found = read("swiss", tmp_path)
-    types = [r.type for r in found.plan.rooms]
+def test_slivers_are_noted_and_undefined_areas_are_typed_by_fixtures(tmp_path: Path) -> None:
+    file = read("swiss", tmp_path)
+    types = [r.type for r in file.plan.rooms]
     assert types == [
         RoomType.LIVING, RoomType.KITCHEN, RoomType.HALL, RoomType.BEDROOM, RoomType.BATHROOM,
     ]  # fmt: skip
-    assert found.left_out == ("an area below 0.5 m2 is a sliver",)
-    assert {t.name for t in found.storeys[0].things} == {
+    assert file.left_out == ("an area below 0.5 m2 is a sliver",)
+    assert {t.name for t in file.storeys[0].things} == {
         "KITCHEN", "SINK", "TOILET", "BATHTUB", "BUILT_IN_FURNITURE",
     }  # fmt: skip
 
@@ -147,7 +145,7 @@ def test_a_column_stays_and_a_railing_inside_is_a_parapet(tmp_path: Path) -> Non
     assert [round(w.thickness, 2) for w in extra] == [0.3, 0.1]
 
 
-def test_storeys_of_a_file_are_storeys_and_one_can_be_asked_for(tmp_path: Path) -> None:
+def test_storeys_of_a_file_are_kept_and_one_can_be_selected(tmp_path: Path) -> None:
     path = write_zind(tmp_path, n_floors=2)
     assert len(plan_from_file(path).storeys) == 2
     assert plan_from_file(path, Part(floor=1)).storeys[0].name == "floor_02"
@@ -170,7 +168,7 @@ def test_a_scan_of_two_stories_has_two_storeys(tmp_path: Path) -> None:
     assert max(t.low for t in upper_storey.things) < 0.1
 
 
-def test_older_scans_with_text_and_rows_say_the_same(tmp_path: Path) -> None:
+def test_older_scans_with_text_and_rows_give_the_same_plan(tmp_path: Path) -> None:
     path = write_room_plan(tmp_path)
     before = plan_from_file(path)
     value = json.loads(path.read_text())
@@ -185,12 +183,12 @@ def test_older_scans_with_text_and_rows_say_the_same(tmp_path: Path) -> None:
 def test_a_layout_of_a_machine_loses_a_stray_door_and_keeps_the_rest(tmp_path: Path) -> None:
     path = write_spatial_lm(tmp_path)
     path.write_text(path.read_text() + "door_9=Door(wall_0,2.5,-2.0,5.9,0.9,2.05)\n")
-    found = plan_from_file(path)
-    assert len(found.plan.openings) == len(HOLES)
-    assert found.left_out == ("door 6: an opening is 2.0 m from the nearest wall",)
+    file = plan_from_file(path)
+    assert len(file.plan.openings) == len(HOLES)
+    assert file.left_out == ("door 6: an opening is 2.0 m from the nearest wall",)
 
 
-def test_an_open_wall_tells_where_its_gap_is(tmp_path: Path) -> None:
+def test_an_open_wall_gives_the_place_of_its_gap(tmp_path: Path) -> None:
     lines = [((0.0, 0.0), (4.0, 0.0)), ((4.0, 0.0), (4.0, 3.0)), ((4.0, 3.0), (1.7, 3.0)),
              ((0.0, 3.0), (0.0, 0.0))]  # fmt: skip
     with pytest.raises(
@@ -199,19 +197,19 @@ def test_an_open_wall_tells_where_its_gap_is(tmp_path: Path) -> None:
         closed_rings(tmp_path / "x.txt", lines)
 
 
-def test_a_room_of_rooms_drawn_over_each_other_keeps_what_is_its_own(tmp_path: Path) -> None:
+def test_a_room_under_other_rooms_keeps_its_uncovered_part(tmp_path: Path) -> None:
     path = write_zind(tmp_path)
     value = json.loads(path.read_text())
     rooms = value["redraw"]["floor_01"]
     rooms["room_00"]["vertices"][1][0] += 0.12 / 2.5
-    found = plan_from_file(_written(path, value))
-    assert len(found.plan.rooms) == len(ROOMS)
-    # A room inside another goes.
+    file = plan_from_file(_written(path, value))
+    assert len(file.plan.rooms) == len(ROOMS)
+    # A room inside another is dropped.
     inner = {"vertices": [[0.4, -0.4], [0.8, -0.4], [0.8, -0.8], [0.4, -0.8]]}
     rooms["room_99"] = inner
-    found = plan_from_file(_written(path, value))
-    assert len(found.plan.rooms) == len(ROOMS)
-    assert any("inside another" in line for line in found.left_out)
+    file = plan_from_file(_written(path, value))
+    assert len(file.plan.rooms) == len(ROOMS)
+    assert any("inside another" in line for line in file.left_out)
 
 
 def test_a_traced_home_has_its_openings_by_their_outlines_and_its_scale_is_an_area(
@@ -221,9 +219,9 @@ def test_a_traced_home_has_its_openings_by_their_outlines_and_its_scale_is_an_ar
     drawn = plan_from_file(path).plan
     file = plan_from_file(_written(path, traced(json.loads(path.read_text()), 1.18)))
     assert file.left_out == ()
-    for room, other in zip(file.plan.rooms, drawn.rooms, strict=True):
-        assert (room.type, room.name) == (other.type, other.name)
-        np.testing.assert_allclose(room.polygon, other.polygon, atol=1e-3)
+    for room, drawn_room in zip(file.plan.rooms, drawn.rooms, strict=True):
+        assert (room.type, room.name) == (drawn_room.type, drawn_room.name)
+        np.testing.assert_allclose(room.polygon, drawn_room.polygon, atol=1e-3)
     for hole, drawn_hole in zip(file.plan.openings, drawn.openings, strict=True):
         assert (hole.kind, hole.wall) == (drawn_hole.kind, drawn_hole.wall)
         sizes = (drawn_hole.along, drawn_hole.width, drawn_hole.sill)
@@ -241,9 +239,9 @@ def test_outlines_of_areas_in_another_unit_than_the_vertices_are_as_large_as_the
         (ring,) = area["coords"]
         area["coords"] = [[[x / 118 / unit_m, y / 118 / unit_m] for x, y in ring]]
     rooms = plan_from_file(_written(path, value)).plan.rooms
-    for room, other in zip(rooms, drawn.rooms, strict=True):
-        assert (room.type, room.name) == (other.type, other.name)
-        np.testing.assert_allclose(room.polygon, other.polygon, atol=1e-3)
+    for room, drawn_room in zip(rooms, drawn.rooms, strict=True):
+        assert (room.type, room.name) == (drawn_room.type, drawn_room.name)
+        np.testing.assert_allclose(room.polygon, drawn_room.polygon, atol=1e-3)
 
 
 def test_areas_without_an_inside_leave_the_rooms_to_the_lines(tmp_path: Path) -> None:
@@ -278,15 +276,15 @@ def test_a_hole_without_a_place_is_a_guess_and_a_note(tmp_path: Path) -> None:
     assert line.startswith("layers.layer-1.holes.h0: a hole has no place")
 
 
-def test_a_stub_of_wall_is_as_thick_as_it_is_drawn(tmp_path: Path) -> None:
+def test_a_stub_of_wall_has_its_drawn_thickness(tmp_path: Path) -> None:
     path = write_zind(tmp_path)
     value, ring = with_a_stub(json.loads(path.read_text()))
     plan = plan_from_file(_written(path, value)).plan
-    (found,) = plan.rooms
-    assert Polygon(found.polygon).symmetric_difference(Polygon(ring)).area < 1e-3
+    (room,) = plan.rooms
+    assert Polygon(room.polygon).symmetric_difference(Polygon(ring)).area < 1e-3
     (stub,) = [w for w in plan.walls if not w.is_outer]
     assert (stub.thickness, stub.length) == pytest.approx((0.11, 1.2))
-    # No wall runs across: all are level or upright.
+    # No wall is oblique: all are level or upright.
     assert all(
         min(abs(a - b) for a, b in zip(w.start, w.end, strict=True)) < 1e-6 for w in plan.walls
     )
@@ -315,10 +313,10 @@ def test_a_footprint_turns_as_its_shape_does(turn: float) -> None:
 
 
 @fronts
-def test_turning_a_home_upright_turns_its_things_with_it(tmp_path: Path, name: str) -> None:
+def test_turning_a_home_upright_turns_its_furniture(tmp_path: Path, name: str) -> None:
     file = read(name, tmp_path)
-    found = upright(file)
-    for before, after in zip(file.storeys[0].things, found.storeys[0].things, strict=True):
+    turned = upright(file)
+    for before, after in zip(file.storeys[0].things, turned.storeys[0].things, strict=True):
         assert (before.x, before.z) == pytest.approx((after.x, after.z), abs=0.1)
 
 
@@ -413,7 +411,7 @@ FAULTS["deep groups"] = (
 
 
 @pytest.mark.parametrize("fault", FAULTS)
-def test_a_file_that_is_no_plan_is_one_line_soon(tmp_path: Path, fault: str) -> None:
+def test_a_file_that_is_no_plan_is_refused_quickly(tmp_path: Path, fault: str) -> None:
     write, message = FAULTS[fault]
     path = write(tmp_path)
     started = time.monotonic()
@@ -442,7 +440,7 @@ def test_json_that_ends_early_names_the_place(
         plan_from_file(path)
 
 
-def test_a_plan_whose_scale_is_null_is_as_it_is_drawn(tmp_path: Path) -> None:
+def test_a_plan_without_a_scale_keeps_its_drawn_size(tmp_path: Path) -> None:
     path = write_react_planner(tmp_path)
     drawn = plan_from_file(path).plan
     value = json.loads(path.read_text()) | {"scale": None}

@@ -1,4 +1,4 @@
-"""A user's programme: what it may say, and one clear line for what it may not."""
+"""A user's programme: valid fields, and one clear line for each error."""
 
 from __future__ import annotations
 
@@ -60,15 +60,13 @@ def test_the_rooms_take_the_area_of_the_whole_home(tmp_path: Path) -> None:
         ({"rooms": FLAT, "n_blind_sides": 3}, "n_blind_sides: expected 2 or less"),
     ],
 )
-def test_a_programme_that_cannot_be_met_is_one_line(
-    tmp_path: Path, value: object, message: str
-) -> None:
+def test_an_unsatisfiable_programme_is_refused(tmp_path: Path, value: object, message: str) -> None:
     with pytest.raises(BadInput, match=message) as caught:
         programme_from_json(written(tmp_path, value))
     assert "\n" not in str(caught.value)
 
 
-def test_a_missing_file_is_one_line(tmp_path: Path) -> None:
+def test_a_missing_file_is_refused_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r"none\.json"):
         programme_from_json(tmp_path / "none.json")
 
@@ -96,8 +94,8 @@ def test_a_programme_has_an_office_of_the_size_of_its_wish(tmp_path: Path) -> No
 
 
 @pytest.mark.long
-def test_a_programme_without_a_plan_says_what_to_leave_out(tmp_path: Path) -> None:
-    # Five rooms on a page cannot all lie beside each other: these four and the hall.
+def test_a_programme_without_a_plan_names_the_fields_to_drop(tmp_path: Path) -> None:
+    # Five rooms on a page cannot all be adjacent: these four and the hall.
     four = ("living", "Ada", "Ben", "store")
     rooms = [*FLAT, {"type": "bedroom", "name": "Ben"}, "store"]
     value = {"rooms": rooms, "adjacent": [list(pair) for pair in combinations(four, 2)]}
@@ -120,7 +118,7 @@ def test_a_bathroom_beside_a_bedroom_is_entered_from_it(
         bath = "Bathroom" if is_only else "Bath"
         doors = [{names[o.room], names[o.other]} for o in plan.openings if o.other is not None]
         assert {"Ada", bath} in doors
-        # Another bathroom is for everybody; this one is Ada's alone.
+        # The other bathroom is shared; this one is only Ada's.
         assert is_only or {"Hall", bath} not in doors
         assert is_only or any("Hall" in pair and "Bathroom 1" in pair for pair in doors)
 
@@ -135,8 +133,6 @@ def test_a_bathroom_beside_a_bedroom_is_entered_from_it(
         ([["Ada", "Ada"]], "'Ada' is one room"),
     ],
 )
-def test_adjacency_of_rooms_that_are_not_there_is_one_line(
-    tmp_path: Path, pairs: object, message: str
-) -> None:
+def test_adjacency_of_missing_rooms_is_refused(tmp_path: Path, pairs: object, message: str) -> None:
     with pytest.raises(BadInput, match=message):
         programme_from_json(written(tmp_path, {"rooms": FLAT, "adjacent": pairs}))

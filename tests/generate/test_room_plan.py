@@ -28,9 +28,9 @@ FLOOR: list[Place] = [(-2, -1.5), (2, -1.5), (2, 1.5), (-2, 1.5)]
 def surface(
     kind: str, a: Place, b: Place, low: float, high: float, corners: Sequence[Place] = ()
 ) -> dict[str, Any]:
-    """A surface from a to b of the plan; corners: its outline in its own frame, y from its middle."""
-    given = plan_files.surface(kind, a, b, math.dist(a, b), low, high)
-    return given | {"polygonCorners": [[*c, 0] for c in corners], "story": 0}
+    """A surface from a to b of the plan; corners: its outline in its local frame, y from its middle."""
+    fields = plan_files.surface(kind, a, b, math.dist(a, b), low, high)
+    return fields | {"polygonCorners": [[*c, 0] for c in corners], "story": 0}
 
 
 def floor(ring: Sequence[Place]) -> dict[str, Any]:
@@ -49,7 +49,7 @@ def scan(folder: Path, **surfaces: list[dict[str, Any]]) -> Path:
 
 
 def gable(a: Place, b: Place) -> dict[str, Any]:
-    """A wall that rises from the knee walls' height to the ridge in its middle."""
+    """A wall that rises from the height of the knee walls to the ridge in its middle."""
     half, up = math.dist(a, b) / 2, RIDGE_M / 2
     outline = [(-half, KNEE_M - up), (0, up), (half, KNEE_M - up), (half, -up), (-half, -up)]
     return surface("wall", a, b, 0, RIDGE_M, outline)
@@ -98,7 +98,7 @@ def test_an_attic_keeps_its_window_and_door_and_no_light_leaks_in(tmp_path: Path
 def test_an_opening_ends_below_the_slope_over_it(tmp_path: Path) -> None:
     path = attic(tmp_path)
     value = json.loads(path.read_text())
-    # Where it begins, 1.2 m from the ridge, the gable is 1.56 m high.
+    # At its start, 1.2 m from the ridge, the gable is 1.56 m high.
     value["windows"] = [surface("window", (-2, 0.4), (-2, 1.2), 0.9, 2.0)]
     path.write_text(json.dumps(value))
     (window,) = (o for o in plan_from_file(path).plan.openings if o.kind.value == "window")
@@ -134,7 +134,7 @@ def test_an_outline_without_area_is_the_walls_rectangle(tmp_path: Path) -> None:
     value = json.loads(path.read_text())
     for row in (*value["walls"], *value["doors"]):
         row["polygonCorners"] = [[0, 0, 0], [1, 0, 0], [2, 0, 0]]
-    # A floor that crosses itself has no rooms within.
+    # A self-intersecting floor has no rooms.
     value["floors"][0]["polygonCorners"] = [[-2, -1.5, 0], [2, 1.5, 0], [2, -1.5, 0], [-2, 1.6, 0]]
     path.write_text(json.dumps(value))
     assert not any(w.tops for w in plan_from_file(path).plan.walls)
@@ -147,15 +147,15 @@ def test_slopes_below_another_storey_are_a_note(tmp_path: Path) -> None:
              for a, b in zip(FLOOR, [*FLOOR[1:], FLOOR[0]], strict=True)]  # fmt: skip
     value["walls"] += upper
     path.write_text(json.dumps(value))
-    found = plan_from_file(path)
-    assert found.left_out == ("walls rise to a roof below another storey: its ceilings are level",)
-    assert not any(w.tops for s in found.storeys for w in s.plan.walls)
+    file = plan_from_file(path)
+    assert file.left_out == ("walls rise to a roof below another storey: its ceilings are level",)
+    assert not any(w.tops for s in file.storeys for w in s.plan.walls)
 
 
 def whole_home(folder: Path) -> Path:
-    """A home of 8 m by 6 m in one scan, one floor for all: a living room, a hall, a bathroom.
+    """A home of 8 m by 6 m in one scan with a single floor: a living room, a hall, a bathroom.
 
-    The wall between is seen from both sides, and ends at a doorway; the bathroom's has a door in it.
+    The wall between is scanned from both sides and ends at a doorway; the bathroom's has a door.
     """
     ring: list[Place] = [(0, 0), (8, 0), (8, 6), (0, 6)]
     lines = [*zip(ring, [*ring[1:], ring[0]], strict=True),
@@ -169,12 +169,12 @@ def whole_home(folder: Path) -> Path:
     )  # fmt: skip
 
 
-def test_a_home_scanned_at_once_has_its_rooms(tmp_path: Path) -> None:
+def test_a_home_in_one_scan_has_its_rooms(tmp_path: Path) -> None:
     file = plan_from_file(whole_home(tmp_path))
     assert file.left_out == ()
     rooms = file.plan.rooms
-    found = {r.type.value: r.area for r in rooms}
-    assert found == {
+    areas = {r.type.value: r.area for r in rooms}
+    assert areas == {
         "living": pytest.approx(4.95 * 6, rel=0.03),
         "bathroom": pytest.approx(2.95 * 2, rel=0.08),
         "hall": pytest.approx(2.95 * 4, rel=0.08),

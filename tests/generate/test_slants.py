@@ -1,4 +1,4 @@
-"""Sides that are not at right angles, and bays: they add floor, and all else stays where it was."""
+"""Oblique sides and bays: they add floor, and everything else keeps its place."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ _PLAIN = plan_families()["flat"].model_copy(update={"slanted": 0.0, "bay": 0.0})
 
 @cache
 def plain(seed: int) -> Plan:
-    """The first plan from a seed on that has no slants."""
+    """The first plan without slants among the seeds from this one."""
     return next(
         p
         for k in range(8)
@@ -35,14 +35,14 @@ def slanted(seed: int, **shares: float) -> Plan:
 
 
 def tilt_deg(wall: PlanWall) -> int:
-    """Of a wall off the axes, degrees: 0 to 45."""
+    """Angle of a wall off the axes, degrees: 0 to 45."""
     (x0, z0), (x1, z1) = wall.start, wall.end
     short, long = sorted((abs(x1 - x0), abs(z1 - z0)))
     return round(math.degrees(math.atan2(short, long)))
 
 
 def assert_whole(new: Plan, old: Plan) -> None:
-    """Nothing is lost: floor, walls, openings in their walls and before their rooms."""
+    """Check that nothing is lost: floor, walls, openings in their walls and beside their rooms."""
     assert plan_faults(new) == []
     for room, before in zip(new.rooms, old.rooms, strict=True):
         polygon = Polygon(room.polygon)
@@ -57,7 +57,7 @@ def assert_whole(new: Plan, old: Plan) -> None:
 
 @pytest.mark.quick(1)
 @pytest.mark.parametrize("seed", range(4))
-def test_a_slanted_side_is_one_line_and_every_room_reaches_it(seed: int) -> None:
+def test_a_slanted_side_is_one_straight_line_and_every_room_reaches_it(seed: int) -> None:
     old, new = plain(seed), slanted(seed, slanted=1.0)
     tilts = {tilt_deg(w) for w in new.walls} - {0}
     assert len(tilts) == 1, "one side"
@@ -79,7 +79,7 @@ def test_a_bay_has_three_walls_and_its_windows_look_out(seed: int) -> None:
     assert glass[1] >= glass[0] - 1e-9
 
 
-def test_homes_without_either_stay_as_they_are_and_so_do_those_without_the_room_for_a_bay() -> None:
+def test_homes_without_slants_or_space_for_a_bay_are_unchanged() -> None:
     assert slanted(0) is plain(0)
     assert slanted(2, bay=1.0) is plain(2)
 
@@ -87,7 +87,7 @@ def test_homes_without_either_stay_as_they_are_and_so_do_those_without_the_room_
 @pytest.mark.long
 def test_a_fifth_of_homes_and_more_have_a_wall_that_is_not_at_right_angles() -> None:
     families = [plan_families()[name] for name in PLANS]
-    wanted = [f.weight * (1 - (1 - f.slanted) * (1 - f.bay)) for f in families]
-    assert sum(wanted) > 0.35
+    shares = [f.weight * (1 - (1 - f.slanted) * (1 - f.bay)) for f in families]
+    assert sum(shares) > 0.35
     drawn = [drawn_plan(np.random.default_rng(seed)) for seed in range(12)]
     assert sum(any(map(tilt_deg, p.walls)) for p in drawn) >= 3

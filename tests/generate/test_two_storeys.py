@@ -1,4 +1,4 @@
-"""Homes of two storeys: one outline, stairs at one place, a hole in the upper floor."""
+"""Homes of two storeys: one outline, stairs in the same place, a hole in the upper floor."""
 
 from __future__ import annotations
 
@@ -78,13 +78,13 @@ def test_the_stairs_lie_free_in_both_storeys_and_before_them_the_hall(seed: int)
 
 @pytest.mark.quick(1)
 @pytest.mark.parametrize("seed", SEEDS)
-def test_the_upper_floor_has_a_hole_over_the_stairs_alone(seed: int) -> None:
+def test_the_upper_floor_has_a_hole_only_over_the_stairs(seed: int) -> None:
     assert not house(seed).notes
     (stairs,) = [i for i in house(seed).items if i.kind is ItemKind.STAIRS]
     levels = sorted({room.floor_y for room in house(seed).rooms})
     assert levels[1] == pytest.approx(home(seed)[0][0].height + SLAB_M)
     assert stairs.bounds[1][1] > levels[1]
-    # Floors above, ceilings below: all of the rooms but the stairs.
+    # Floors above, ceilings below: all of the rooms except the stairs.
     for kind, level in ((ItemKind.FLOOR, levels[1]), (ItemKind.CEILING, levels[0])):
         rooms = [r for r in house(seed).rooms if r.floor_y == level]
         whole = sum(Polygon(r.polygon).area for r in rooms if r.name != "Stairs")
@@ -124,7 +124,7 @@ def test_steps_are_equal_and_low_and_end_at_the_upper_floor() -> None:
     assert rise / n <= 0.185
     assert all(np.abs(tops - y).min() < 1e-3 for y in heights)
     assert tops.max() == pytest.approx(rise - rise / n, abs=1e-3)
-    # It fills its ground, and its railing stands on the upper floor.
+    # The flight fills its ground, and its railing is on the upper floor.
     assert shape.bounds[0] == pytest.approx((-1.0, 0.0, -1.375), abs=1e-6)
     assert shape.bounds[1] == pytest.approx((1.0, rise + 0.95, 1.375), abs=1e-6)
 
@@ -136,14 +136,14 @@ def test_two_storeys_without_enough_bedrooms_are_refused_with_the_nearest() -> N
 
 @pytest.mark.slow
 def test_a_small_area_leaves_fewer_bedrooms_rather_than_no_plan() -> None:
-    # Seeds that would draw four bedrooms, which need 96 m2.
+    # Seeds that draw four bedrooms, which need 96 m2.
     for seed in (4, 5, 9):
         plans, _stair = drawn_storeys(np.random.default_rng(seed), Wishes(area=(84, 92), storeys=2))
         n = sum(room.type is RoomType.BEDROOM for plan in plans for room in plan.rooms)
         assert n in (2, 3)
 
 
-def test_the_file_says_which_storey_the_program_shows_first() -> None:
+def test_the_file_names_the_storey_that_the_program_shows_first() -> None:
     plans, stair = home(0)
     rng = np.random.default_rng(0)
     data = home_file([Storey(plan, ()) for plan in plans], EMPTY, rng, stair)

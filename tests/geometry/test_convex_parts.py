@@ -1,4 +1,4 @@
-"""Convex parts of things: they hold all of a thing, keep near to it, and leave hollows open."""
+"""Convex parts of items: they enclose the whole item, stay close to it, and leave hollows open."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def is_in_any(parts: tuple[F64, ...], point: tuple[float, ...]) -> bool:
 
 
 def tray(wall: float = 0.02) -> F64:
-    """A tray 0.4 x 0.2 x 0.3, open above, one closed mesh: outside, inside, rim."""
+    """A tray 0.4 x 0.2 x 0.3, open at the top, one closed mesh: outside, inside, rim."""
     outer = np.array([[x, y, z] for x in (0, 0.4) for y in (0, 0.2) for z in (0, 0.3)])
     inner = np.array(
         [[x, y, z] for x in (wall, 0.4 - wall) for y in (wall, 0.2) for z in (wall, 0.3 - wall)]
@@ -43,14 +43,14 @@ def test_a_tray_is_its_bottom_and_walls_and_stays_open(turn: float) -> None:
     matrix = rotation_y(turn)
     parts = close_parts(tray() @ matrix.T)
     volume = 0.4 * 0.2 * 0.3 - 0.36 * 0.18 * 0.26
-    # Parts that are cut from one another do not overlap: their volumes add up.
+    # Parts from cutting do not overlap: their volumes add up.
     assert sum(map(hull_volume, parts)) == pytest.approx(volume, rel=0.02)
     assert not is_in_any(parts, tuple(matrix @ (0.2, 0.1, 0.15)))
     assert is_in_any(parts, tuple(matrix @ (0.01, 0.1, 0.15)))
     assert is_in_any(parts, tuple(matrix @ (0.2, 0.01, 0.15)))
 
 
-def test_a_tunnel_is_not_filled_however_short_its_pieces() -> None:
+def test_a_tunnel_of_short_pieces_is_not_filled() -> None:
     rings = [[(-0.1, -0.1), (0.1, -0.1), (0.1, 0.1), (-0.1, 0.1)]]
     rings.append([(0.8 * x, 0.8 * y) for x, y in rings[0]])
     p = np.array([[x, y, z] for ring in rings for z in (0.0, 1.0) for x, y in ring])
@@ -66,7 +66,7 @@ def test_a_tunnel_is_not_filled_however_short_its_pieces() -> None:
     assert sum(map(hull_volume, parts)) == pytest.approx(0.04 - 0.0256, rel=0.02)
 
 
-def test_no_part_is_left_out_where_there_are_more_than_may_be() -> None:
+def test_no_part_is_lost_if_there_are_more_than_the_limit() -> None:
     boxes = [solid((k * 0.1, 0, 0), (k * 0.1 + 0.02, 0.02, 0.02)) for k in range(50)]
     parts = close_parts(np.concatenate(boxes), most=8)
     assert len(parts) == 8

@@ -1,4 +1,4 @@
-"""Rooms end at doorways: gaps between walls, doors wide."""
+"""Rooms end at doorways: gaps between walls as wide as doors."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ def parts(*walls: Polygon) -> list[float]:
     """Areas of the rooms between the outer walls and these."""
     standing = unary_union([OUTER, *walls])
     (piece,) = shapely.get_parts(GROUND.difference(standing))
-    found = parted_at_doorways(piece, doorways(standing))
-    assert sum(p.area for p in found) == pytest.approx(piece.area)
-    return sorted(p.area for p in found)
+    pieces = parted_at_doorways(piece, doorways(standing))
+    assert sum(p.area for p in pieces) == pytest.approx(piece.area)
+    return sorted(p.area for p in pieces)
 
 
 @pytest.mark.parametrize(("width", "n"), [(0.7, 2), (0.9, 2), (1.25, 2), (0.3, 1), (1.6, 1)])
@@ -61,7 +61,7 @@ def test_a_pillar_and_a_niche_part_nothing() -> None:
     assert len(parts(pillar, cheek)) == 1
 
 
-def test_what_no_one_can_stand_in_is_no_room() -> None:
+def test_an_area_too_small_to_stand_in_is_no_room() -> None:
     # A closet of 0.6 m by 1.2 m, open towards the room.
     assert len(parts(box(7.0, 0.2, 7.2, 0.6), box(7.0, 1.4, 7.8, 1.6))) == 1
 
@@ -74,7 +74,7 @@ def test_walls_without_thickness_part_a_ground_and_close_at_doorways() -> None:
         LineString([(4.15, 3.5), (7.9, 3.5)]), *(LineString(s) for s in _sides(box(0, 0, 8, 6))),
     ]  # fmt: skip
     rooms = rooms_by_walls(box(0, 0, 8, 6), lines)
-    # But for the jambs, of which each takes its corner.
+    # Except for the jambs, whose corners belong to one room each.
     assert all(a.intersection(b).area < 0.01 for k, a in enumerate(rooms) for b in rooms[:k])
     assert sorted(r.area for r in rooms) == pytest.approx(
         [3.95 * 2.5, 3.95 * 3.5, 3.95 * 6], rel=0.02

@@ -1,4 +1,4 @@
-"""The air of rooms: what is put there is clear of all else, at any place and turn."""
+"""The air of rooms: objects placed there are clear of everything, for any position and rotation."""
 
 from __future__ import annotations
 
@@ -32,12 +32,12 @@ FLOOR = structure("floor", ItemKind.FLOOR, [0, -0.1, 0], [WIDTH, 0, DEPTH])
 
 def poses_in(air: FreeAir, n: int, seed: int = 1) -> list[F64]:
     rng = np.random.default_rng(seed)
-    found = (air.put(room(), CUBOID, rng) for _ in range(n))
-    return [pose for pose in found if pose is not None]
+    drawn_poses = (air.put(room(), CUBOID, rng) for _ in range(n))
+    return [pose for pose in drawn_poses if pose is not None]
 
 
 def grid_on(half: F64, n: int = 12) -> F64:
-    """Points all over the sides of a cuboid about the origin."""
+    """Points spread over the sides of a cuboid about the origin."""
     u = np.linspace(-1, 1, n)
     a, b = (g.ravel() for g in np.meshgrid(u, u))
     sides = []
@@ -53,23 +53,23 @@ def distance_to_cuboid(points: F64, half: F64) -> float:
     return float(np.linalg.norm(np.maximum(np.abs(points) - half, 0), axis=1).min())
 
 
-def test_what_hangs_in_a_room_keeps_clear_of_it_and_of_each_other() -> None:
+def test_floating_objects_keep_clear_of_the_room_and_of_each_other() -> None:
     table = solid("table", [1, 0, 1], [2.5, 0.75, 2])
     poses = poses_in(FreeAir([FLOOR, table]), 30)
     assert len(poses) > 20
     points = [grid_on(HALF) @ p[:3, :3].T + p[:3, 3] for p in poses]
     middle, half = np.array([1.75, 0.375, 1.5]), np.array([0.75, 0.375, 0.5])
-    for k, own in enumerate(points):
-        assert own.min(0) == pytest.approx(own.min(0).clip(CLEAR_M))
-        assert (own.max(0) <= np.array([WIDTH, HEIGHT, DEPTH]) - CLEAR_M + 1e-9).all()
-        assert distance_to_cuboid(own - middle, half) >= CLEAR_M - 1e-9
-        for other in poses[:k]:
-            local = (own - other[:3, 3]) @ other[:3, :3]
+    for k, own_points in enumerate(points):
+        assert own_points.min(0) == pytest.approx(own_points.min(0).clip(CLEAR_M))
+        assert (own_points.max(0) <= np.array([WIDTH, HEIGHT, DEPTH]) - CLEAR_M + 1e-9).all()
+        assert distance_to_cuboid(own_points - middle, half) >= CLEAR_M - 1e-9
+        for pose in poses[:k]:
+            local = (own_points - pose[:3, 3]) @ pose[:3, :3]
             assert distance_to_cuboid(local, HALF) >= CLEAR_M - 1e-9
 
 
-def test_nothing_hangs_inside_a_hollow_thing() -> None:
-    # A cupboard as large as the room's half: its inside is free of faces, and no air of the room.
+def test_nothing_floats_inside_a_hollow_item() -> None:
+    # A cupboard as large as half the room: its inside has no faces, but is no air of the room.
     cupboard = solid("cupboard", [0.01, 0.01, 0.01], [2, 2.2, 2.5])
     poses = poses_in(FreeAir([FLOOR, cupboard]), 40)
     assert poses
@@ -77,12 +77,12 @@ def test_nothing_hangs_inside_a_hollow_thing() -> None:
         assert not ((pose[:3, 3] > [0, 0, 0]) & (pose[:3, 3] < [2, 2.2, 2.5])).all()
 
 
-def test_the_inside_of_a_home_that_is_one_mesh_is_air() -> None:
+def test_the_inside_of_a_one_mesh_home_is_air() -> None:
     shell = solid("scan", [-0.1, -0.1, -0.1], [WIDTH + 0.1, HEIGHT + 0.1, DEPTH + 0.1])
     assert poses_in(FreeAir([FLOOR, shell]), 5)
 
 
-def test_nothing_hangs_over_a_sloping_ceiling() -> None:
+def test_nothing_floats_above_a_sloping_ceiling() -> None:
     # From 1 m at x = 0 to the room's height at the other side.
     slope = np.array([[[0, 1, 0], [0, 1, DEPTH], [WIDTH, HEIGHT, DEPTH], [WIDTH, HEIGHT, 0.0]]])
     ceiling = Item("c", "c", ItemKind.CEILING, "0", (quads_surface("c", slope, 0),), 22)
@@ -93,15 +93,15 @@ def test_nothing_hangs_over_a_sloping_ceiling() -> None:
         assert (points[:, 1] < 1 + (HEIGHT - 1) * points[:, 0] / WIDTH).all()
 
 
-def test_a_thing_that_is_too_large_finds_no_place() -> None:
+def test_an_object_too_large_finds_no_place() -> None:
     rng = np.random.default_rng(1)
     assert FreeAir([FLOOR]).put(room(), CUBOID * 30, rng) is None
 
 
 def test_equal_draws_give_equal_places_and_others_others() -> None:
-    one, same, other = (np.array(poses_in(FreeAir([FLOOR]), 5, seed)) for seed in (1, 1, 2))
-    assert (one == same).all()
-    assert (one[:, :3, 3] != other[:, :3, 3]).all()
+    first, same, other_seed = (np.array(poses_in(FreeAir([FLOOR]), 5, seed)) for seed in (1, 1, 2))
+    assert (first == same).all()
+    assert (first[:, :3, 3] != other_seed[:, :3, 3]).all()
 
 
 def test_turns_are_rotations_that_favour_no_direction() -> None:

@@ -1,4 +1,4 @@
-"""A home at another time: joints and whole things where their motions say."""
+"""A home at another time: joints and whole items follow their motions."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pbrs_farm.core.house import House, MaterialKind, geometry_from_house
 from pbrs_farm.core.joints import JointKind
 from pbrs_farm.core.motions import Motion
 from pbrs_farm.geometry.moving import MovingHouse, house_at
-from tests.inputs.cupboards import cupboard, thing
+from tests.inputs.cupboards import box_item, cupboard
 from tests.truth.hits import house
 
 QUARTER = (float(np.sqrt(0.5)), 0.0, float(np.sqrt(0.5)), 0.0)  # 90 degrees about y: +x goes to -z
@@ -19,7 +19,7 @@ QUARTER = (float(np.sqrt(0.5)), 0.0, float(np.sqrt(0.5)), 0.0)  # 90 degrees abo
 
 def home(*motions: Motion) -> House:
     """A cupboard with a drawer, and a brick of 20 cm with its middle at (2, 0.1, 0)."""
-    items = cupboard(JointKind.PRISMATIC), thing("brick", (1.9, 0.0, -0.1), (2.1, 0.2, 0.1))
+    items = cupboard(JointKind.PRISMATIC), box_item("brick", (1.9, 0.0, -0.1), (2.1, 0.2, 0.1))
     return replace(house(), items=items, motions=motions)
 
 
@@ -40,14 +40,14 @@ def test_a_drawer_is_out_by_its_key_and_the_rest_is_shared() -> None:
     assert later.items[0].joints[0].value == pytest.approx(0.2)
 
 
-def test_a_thing_moves_and_turns_with_its_box() -> None:
+def test_an_item_moves_and_turns_with_its_box() -> None:
     later = house_at(home(SLIDE), 1.0).items[1]
     assert later.bounds == pytest.approx(np.array([[2.9, 0, -0.1], [3.1, 0.2, 0.1]]), abs=1e-6)
     assert later.oriented_box.centre == pytest.approx([3.0, 0.1, 0.0], abs=1e-6)
     assert later.oriented_box.axes[:, 0] == pytest.approx([0, 0, -1], abs=1e-9)
 
 
-def test_a_drawer_goes_with_the_thing_that_it_is_of() -> None:
+def test_a_drawer_follows_its_item() -> None:
     rest = home(PULL, PUSH)
     later = house_at(rest, 1.0).items[0]
     assert later.surfaces[0].positions == pytest.approx(
@@ -64,12 +64,12 @@ def test_triangles_at_a_time_are_those_of_the_house_then() -> None:
     moving = MovingHouse(rest, geometry_from_house(rest))
     then, geometry = moving.at(1.5)
     np.testing.assert_array_equal(geometry.positions, geometry_from_house(then).positions)
-    # Of the cupboard the front moves, of the brick all of it.
+    # The front of the cupboard moves, and the whole brick.
     n = [len(s.faces) for item in rest.items for s in item.surfaces]
     np.testing.assert_array_equal(moving.moving_faces, np.repeat([False, True, True], n))
 
 
-def test_faces_are_taken_from_one_time_to_another() -> None:
+def test_faces_are_mapped_from_one_time_to_another() -> None:
     rest = home(PULL, SLIDE)
     moving = MovingHouse(rest, geometry_from_house(rest))
     numbers, matrices = moving.face_motions(0.5, 1.0)
@@ -81,10 +81,10 @@ def test_faces_are_taken_from_one_time_to_another() -> None:
     assert (numbers[~moving.moving_faces] == 0).all()
 
 
-def test_panes_that_light_passes_are_left_out_wherever_they_stand() -> None:
+def test_panes_are_left_out_in_every_pose() -> None:
     rest = home(PULL, SLIDE)
     pane = replace(rest.materials[0], kind=MaterialKind.PANE)
-    window = thing("window", (0, 1, 0), (1, 2, 0.01))
+    window = box_item("window", (0, 1, 0), (1, 2, 0.01))
     surfaces = tuple(replace(s, material=1) for s in window.surfaces)
     rest = replace(
         rest, items=(replace(window, surfaces=surfaces), *rest.items),

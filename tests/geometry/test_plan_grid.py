@@ -17,7 +17,7 @@ def test_touched_cells_include_those_of_upright_faces() -> None:
     assert hits.high.max() == 1
 
 
-def test_groups_of_faces_cover_what_each_covers_alone() -> None:
+def test_groups_of_faces_cover_the_union_of_their_faces() -> None:
     grid = PlanGrid(np.zeros(2), 0.3, 0.1, (20, 20))
     groups = list(np.random.default_rng(4).uniform(0, 2, (3, 5, 3, 3)))
     alone = [covered(grid, group) for group in groups]

@@ -25,7 +25,7 @@ def test_a_drawer_sweeps_its_front_as_far_as_it_comes_out() -> None:
 def test_a_door_sweeps_the_sector_about_its_hinge() -> None:
     (swept,) = swept_by_item(cupboard(JointKind.REVOLUTE))
     radius = np.hypot(WIDE - 0.003, DEEP)
-    # Seen from above: of 110 degrees about the hinge, and as thick as the door at its shut end.
+    # From above: 110 degrees about the hinge, plus the door's thickness at its shut end.
     sector = np.radians(110) / 2 * radius**2
     assert swept.area.area == pytest.approx(sector, rel=0.04)
     assert swept.area.bounds[3] == pytest.approx(DEEP + radius, abs=0.01)
@@ -38,7 +38,7 @@ def test_a_turned_cupboard_sweeps_the_same_ground_turned() -> None:
     assert swept.area.area == pytest.approx((WIDE - 0.003) * (DEEP + 0.4), rel=1e-4)
 
 
-def test_doorways_and_what_opens_overhead_keep_no_ground() -> None:
+def test_doorways_and_overhead_fronts_sweep_no_ground() -> None:
     shut = cupboard(JointKind.PRISMATIC)
     assert swept_by_item(replace(shut, kind=ItemKind.DOOR)) == []
     high = moved_item(shut, np.array([0.0, 1.5, 0.0]))

@@ -1,4 +1,4 @@
-"""Names of things by whole words."""
+"""Names of items by whole words."""
 
 from dataclasses import replace
 
@@ -34,7 +34,7 @@ def test_a_name_is_parted_into_whole_words(name: str, words: set[str]) -> None:
 
 
 @pytest.mark.parametrize("name", ["Woven basket", "Hobby table", "Shepherd's crook"])
-def test_what_only_holds_the_letters_of_a_cooker_makes_no_kitchen(name: str) -> None:
+def test_a_word_that_contains_cooker_makes_no_kitchen(name: str) -> None:
     assert not is_cooked_in([named(name)])
 
 

@@ -1,4 +1,4 @@
-"""What a room is for, by what it is called."""
+"""Room types from room names."""
 
 from dataclasses import replace
 
@@ -19,7 +19,7 @@ from pbrs_farm.read.builtin.builtin_home import builtin_home
         ("Bedrooms", RoomKind.BEDROOM), ("Gang", RoomKind.HALL), ("Balcon", RoomKind.OUTDOOR),
     ],
 )  # fmt: skip
-def test_a_room_is_what_its_name_says_in_many_languages(name: str, kind: RoomKind) -> None:
+def test_a_rooms_name_gives_its_use_in_many_languages(name: str, kind: RoomKind) -> None:
     room = replace(builtin_home().rooms[0], name=name, types=())
     assert room_kind(room, [], 12.0) is kind
 
@@ -29,7 +29,7 @@ def test_a_room_is_what_its_name_says_in_many_languages(name: str, kind: RoomKin
     ["Courtyard", "Lawn", "Backyard", "Gazebo", "Driveway", "Cour", "Hof", "Pergola", "Balconies",
      "庭", "中庭", "терраса 2"],
 )  # fmt: skip
-def test_nobody_lives_where_the_name_says_outdoors(name: str) -> None:
+def test_outdoor_names_are_not_living_rooms(name: str) -> None:
     room = replace(builtin_home().rooms[0], name=name, types=())
     assert room_kind(room, [], 12.0) is RoomKind.OUTDOOR
     assert not is_lived_in(room, 12.0)
@@ -43,9 +43,7 @@ def test_a_garage_stores_and_is_not_lived_in(name: str) -> None:
 
 
 @pytest.mark.parametrize("others", [("fridge",), ("toilet",), ("fridge", "bathtub")])
-def test_a_room_without_a_name_where_one_sits_on_a_sofa_is_lived_in(
-    others: tuple[str, ...],
-) -> None:
+def test_an_unnamed_room_with_a_sofa_is_a_living_room(others: tuple[str, ...]) -> None:
     classes = {"sofa": 6, "fridge": 24, "toilet": 33, "bathtub": 36}
     items = [
         Item(name, name, ItemKind.OBJECT, "0", (), classes[name]) for name in ("sofa", *others)

@@ -1,4 +1,4 @@
-"""SUNCG v2: spoiled arch.json. Effects: they write the roots."""
+"""SUNCG v2: damaged arch.json. Effects: they write the roots."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What a hostile input is, and the words of the command that reads it; no effects."""
+"""A hostile input, and the arguments of the command that reads it; no effects."""
 
 from __future__ import annotations
 
@@ -16,15 +16,16 @@ TINY: Final = (
     "--set", "cameras.score_height_px=48", "--set", "cameras.coarse_width_px=32",
     "--set", "cameras.coarse_height_px=24",
 )  # fmt: skip
-"""A recipe that costs as little as one can."""
+"""The cheapest recipe."""
 
 ONE_VIEW: Final = (*TINY, "--views", "1", "--modes", "opengl_dl")
 
 
 @dataclass(frozen=True, slots=True)
 class Place:
-    """Where a case may write. folder: its own. sound: a sound home, the neighbour of every bad
-    one. stored: the output folder of a finished run of that home, to be copied, not changed."""
+    """Folders for a case. folder: for its files. sound: a sound home, the neighbour of every bad
+    one. stored: the output folder of a finished run of that home, to be copied, not changed.
+    """
 
     folder: Path
     sound: Path
@@ -40,8 +41,8 @@ class Place:
 class Case:
     """A hostile input. write: writes it below a Place and returns the commands to run on it.
 
-    fault: the kind of fault, for the table.  neighbours: sound homes that must be done beside it.
-    is_lossy: something the input names cannot be shown, so that a success must tell it.
+    fault: the kind of fault, for the table.  neighbours: sound homes that must be finished beside it.
+    is_lossy: the input names something that cannot be shown, so that a success must report it.
     """
 
     name: str
@@ -52,14 +53,14 @@ class Case:
 
 
 def run(place: Place, bad: Path | str, *more: str) -> Words:
-    """`run BAD SOUND`, as small as can be."""
+    """The smallest `run BAD SOUND`."""
     return ("run", str(bad), str(place.sound), "--out", str(place.out), *ONE_VIEW, *more)
 
 
 def home(
     name: str, fault: str, file: str, data: Callable[[], bytes] | bytes, *, lossy: bool = False
 ) -> Case:
-    """A case that is one file, run beside the sound home."""
+    """A case of one file, run beside the sound home."""
 
     def write(place: Place) -> list[Words]:
         path = place.folder / file
@@ -70,7 +71,7 @@ def home(
 
 
 def with_sheet(case: Case) -> Case:
-    """The same case, and then `sheet` and `classes` of what came out."""
+    """The same case, followed by `sheet` and `classes` of its output."""
 
     def write(place: Place) -> list[Words]:
         out = str(place.out)
@@ -80,7 +81,7 @@ def with_sheet(case: Case) -> Case:
 
 
 def by_verb(case_name: str, fault: str, verb: str, file: str, data: bytes) -> Case:
-    """A case that is one file, read by `repair` or `cameras`, without a neighbour."""
+    """A case of one file, read by `repair` or `cameras`, without a neighbour."""
 
     def write(place: Place) -> list[Words]:
         path = place.folder / file
@@ -92,10 +93,10 @@ def by_verb(case_name: str, fault: str, verb: str, file: str, data: bytes) -> Ca
 
 
 def unique(cases: Iterable[Case]) -> list[Case]:
-    """The cases in order; ValueError for a name that comes twice."""
-    found: dict[str, Case] = {}
+    """The cases in order; ValueError if a name occurs twice."""
+    by_name: dict[str, Case] = {}
     for case in cases:
-        if case.name in found:
+        if case.name in by_name:
             raise ValueError(f"two cases are called {case.name}")
-        found[case.name] = case
-    return list(found.values())
+        by_name[case.name] = case
+    return list(by_name.values())

@@ -1,4 +1,4 @@
-"""Camera files, recipes and words of a command that ask for the impossible. Effects: they write files."""
+"""Camera files, recipes and arguments that request the impossible. Effects: they write files."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ _SETTINGS: Final = (
 
 
 def cases() -> Iterator[Case]:
-    """Camera files by text and by JSON; settings; other words."""
+    """Camera files as text and as JSON; settings; other arguments."""
     for name, text in _camera_files().items():
         fault = "bounds" if "million" in name else "format"
         yield Case(f"cameras/{name}", fault, partial(_cameras, text), neighbours=0)
@@ -84,7 +84,7 @@ def _cameras(text: Callable[[], str | bytes], place: Place) -> list[Words]:
 
 
 def _sound(place: Place, *more: str) -> Words:
-    """`run SOUND`, with more words."""
+    """`run SOUND` with more arguments."""
     words = list(run(place, place.sound, *more))
     return [words[0], *words[2:]]
 
@@ -92,7 +92,7 @@ def _sound(place: Place, *more: str) -> Words:
 def _setting(setting: str, place: Place) -> list[Words]:
     words = list(_sound(place, "--set", setting))
     if setting.startswith(("light.", "emission.", "tone.", "sky.", "image.width_px=16384")):
-        words[words.index("opengl_dl")] = "mlt_il_ol"  # the mode that these fields are of
+        words[words.index("opengl_dl")] = "mlt_il_ol"  # the mode that has these fields
         words += ["--set", "light.spp=1"] if "spp" not in setting else []
     if setting.startswith(("light.chains", "light.mut", "light.direct", "light.tail")):
         words += ["--set", "light.integrator=metropolis"]

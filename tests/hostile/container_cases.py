@@ -1,4 +1,4 @@
-"""Archives and XML that attack their reader: bombs, lies, other encodings. No effects until written."""
+"""Archives and XML that attack their reader: bombs, false sizes, other encodings. No effects until written."""
 
 from __future__ import annotations
 

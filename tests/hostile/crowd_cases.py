@@ -30,7 +30,7 @@ def cases() -> Iterator[Case]:
 
 
 def _leaves() -> bytes:
-    """A plant of 60,000 triangles, 30,000 loose leaves, under a name that says nothing."""
+    """A plant of 60,000 triangles, 30,000 loose leaves, under a meaningless name."""
     s = scene()
     rng = np.random.default_rng(0)
     places = rng.uniform((1, 0, 1), (2, 1.9, 2), (30_000, 1, 3))

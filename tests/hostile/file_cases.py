@@ -1,4 +1,4 @@
-"""What is no regular file, or no small one, in place of every file that is read. Effects: writes them."""
+"""Irregular and huge files in place of every input file. Effects: writes them."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ FORMS: Final[dict[str, Maker]] = {
     "full": partial(_link, "/dev/full"),
     "empty": Path.touch,
 }
-"""What may stand where a file is expected."""
+"""Things other than a sound file at a file's path."""
 
 _SUNCG_FILES: Final = {
     "room": f"room/{HOUSE}/fr_0rm_0w.obj",
@@ -52,7 +52,7 @@ _SUNCG_FILES: Final = {
     "classes": "metadata/ModelCategoryMappingNewActive.csv",
     "lights": "metadata/suncgModelLights.json",
 }
-"""Files of a SUNCG root. The first is one a house cannot do without."""
+"""Files of a SUNCG root. The first is the one that a house requires."""
 
 
 def cases() -> Iterator[Case]:

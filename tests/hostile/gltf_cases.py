@@ -1,4 +1,4 @@
-"""glTF scenes whose tables lie: sizes, indices, cycles, matrices, pictures. No effects until written."""
+"""glTF scenes with false tables: sizes, indices, cycles, matrices, pictures. No effects until written."""
 
 from __future__ import annotations
 

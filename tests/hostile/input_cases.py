@@ -1,4 +1,4 @@
-"""The realistic house of each format that people have, damaged in the same dozen ways. No effects until written."""
+"""The realistic house of each common format, damaged in the same dozen ways. No effects until written."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def _written(sound: SoundFile, mend: Mend, *, whole: bool) -> Callable[[Place], 
 
 
 def _every(n: int, pattern: re.Pattern[bytes], word: bytes) -> Mend:
-    """Every n-th match is replaced."""
+    """Replace every n-th match."""
 
     def mend(data: bytes) -> bytes:
         count = iter(range(len(data)))
@@ -51,7 +51,7 @@ def _every(n: int, pattern: re.Pattern[bytes], word: bytes) -> Mend:
 
 
 def _of_json(change: Callable[[Any], Any], otherwise: Mend) -> Mend:
-    """A change of what a JSON file holds; of another file its bytes are changed."""
+    """A change of a JSON file's value; of another file `otherwise` changes the bytes."""
 
     def mend(data: bytes) -> bytes:
         try:
@@ -67,21 +67,21 @@ def _lists_twice(value: Any) -> Any:
     if isinstance(value, dict):
         return {key: _lists_twice(v) for key, v in value.items()}
     if isinstance(value, list):
-        both = [_lists_twice(v) for v in value]
-        return both + both if value and isinstance(value[0], dict) else both
+        doubled = [_lists_twice(v) for v in value]
+        return doubled + doubled if value and isinstance(value[0], dict) else doubled
     return value
 
 
 def _crowd(value: Any) -> Any:
-    """The longest list of objects, with a million of them."""
+    """The longest list of objects, extended to a million."""
     if not isinstance(value, dict):
         return value
     lists = {k: v for k, v in value.items() if isinstance(v, list) and v and isinstance(v[0], dict)}
     if not lists:
         return {key: _crowd(v) for key, v in value.items()}
     longest = max(lists, key=lambda key: len(lists[key]))
-    own = lists[longest][0]
-    small = own if len(json.dumps(own)) < 200 else {"id": 1}
+    longest_list = lists[longest][0]
+    small = longest_list if len(json.dumps(longest_list)) < 200 else {"id": 1}
     return value | {longest: [*lists[longest], *([small] * _MILLION)]}
 
 
@@ -118,4 +118,4 @@ FAULTS: Final[dict[str, Mend]] = {
     "leading_out": _every(3, _NAME, b"../../../../etc/passwd"),
     "forged": _every(3, _NAME, b"x\\n" + FORGED.encode()),
 }  # fmt: skip
-"""Name of a fault -> what it does to the bytes of a sound file."""
+"""Name of a fault -> function that applies it to the bytes of a sound file."""

@@ -13,7 +13,7 @@ from tests.read.sweethome3d.sh3d_source import BOX_OBJ, ROOM, WALLS, piece
 _FACE: Final = b"v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 1\n"
 
 _LOSSY: Final = ("missing", "empty", "text", "no_faces", "collada", "studio", "cut", "only_points")
-"""Models of which nothing can be shown."""
+"""Models without any visible part."""
 
 
 def cases() -> Iterator[Case]:
@@ -109,7 +109,7 @@ def _materials() -> dict[str, dict[str, bytes]]:
 
 
 def pictures() -> dict[str, bytes]:
-    """Damaged pictures by what is wrong with them."""
+    """Fault -> a damaged picture."""
     sound = png(32, 32)
     damaged = bytearray(sound)
     damaged[45:60] = b"\xff" * 15

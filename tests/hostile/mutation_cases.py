@@ -1,4 +1,4 @@
-"""Sound files of every format with seeded damage to their bytes and their words. No effects until written."""
+"""Sound files of every format with seeded damage to bytes and words. No effects until written."""
 
 from __future__ import annotations
 
@@ -69,7 +69,7 @@ def flipped(data: bytes, rng: np.random.Generator, n: int = 20) -> bytes:
 
 
 def words(data: bytes, rng: np.random.Generator, n: int = 3) -> bytes:
-    """Text with n of its numbers replaced by what is none, or is no sensible one."""
+    """Text with n of its numbers replaced by invalid or absurd ones."""
     for _ in range(n):
         places = [m.span() for m in re.finditer(rb"-?\d+\.?\d*", data)]
         start, end = places[rng.integers(len(places))]
@@ -84,18 +84,18 @@ def _glb_words(rng: np.random.Generator) -> bytes:
 
 
 def _one_value(document: dict[str, Any], rng: np.random.Generator) -> None:
-    """Replace three values somewhere in the tree by one of another type."""
-    others: tuple[Any, ...] = (None, [], {}, "a", -1, 1e30, True, [[]], 2**40)
+    """Replace three values of the tree by values of another type."""
+    replacements: tuple[Any, ...] = (None, [], {}, "a", -1, 1e30, True, [[]], 2**40)
     for _ in range(3):
-        at: Any = document
+        parent: Any = document
         while True:
-            keys = list(at) if isinstance(at, dict) else list(range(len(at)))
+            keys = list(parent) if isinstance(parent, dict) else list(range(len(parent)))
             key = keys[rng.integers(len(keys))]
-            below = at[key]
+            below = parent[key]
             if not isinstance(below, (dict, list)) or not below or rng.random() < 0.15:
-                at[key] = others[rng.integers(len(others))]
+                parent[key] = replacements[rng.integers(len(replacements))]
                 break
-            at = below
+            parent = below
 
 
 def _suncg(file: str, rng: Rng, place: Place) -> list[Words]:

@@ -1,4 +1,4 @@
-"""Sweet Home 3D plans that no one could build: numbers, polygons, crowds. No effects until written."""
+"""Sweet Home 3D plans that cannot be built: numbers, polygons, crowds. No effects until written."""
 
 from __future__ import annotations
 
@@ -119,7 +119,7 @@ def _rooms() -> dict[str, str]:
 
 
 def _crowd() -> bytes:
-    """19,000 pieces at nearly one place."""
+    """19,000 pieces at nearly the same place."""
     body = "".join(chair(k, 150 + k % 97, 120 + k % 89) for k in range(19_000))
     return archive(WALLS + body)
 
@@ -172,7 +172,7 @@ def _levels() -> bytes:
 
 
 def _hidden_level() -> bytes:
-    """A shown level above and below one that is saved as hidden."""
+    """A visible level above and below a hidden one."""
     levels = "".join(
         f"<level id='L{k}' elevation='{250 * k}' height='250' viewable='{'false' if k == 1 else 'true'}'/>"
         for k in range(3)

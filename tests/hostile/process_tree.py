@@ -1,4 +1,4 @@
-"""Runs a command as a user would, and watches all its processes. Effects: starts and kills them."""
+"""Runs a command like a user, and watches all its processes. Effects: starts and kills them."""
 
 from __future__ import annotations
 
@@ -16,24 +16,24 @@ from pathlib import Path
 from typing import Final
 
 LIMIT_S: Final = 25.0
-"""Seconds until a command is killed; those it waited for a processor do not count."""
+"""Seconds until a command is killed, without those spent waiting for a processor."""
 
 LIMIT_MB: Final = 4000
-"""Resident memory of one process above which its command is killed."""
+"""Resident memory of one process, in MB, above which its command is killed."""
 
 _ADDRESS_SPACE: Final = 24 * 2**30
-"""What a process may map: a last guard for what grows faster than it is polled."""
+"""Limit of mapped memory: a last guard against growth faster than the polling."""
 
 _POLL_S: Final = 0.1
 
 
 @dataclass(frozen=True, slots=True)
 class Ended:
-    """How a command ended. code: negative for a signal. killed: "time" or "memory" by our guard.
+    """The end of a command. code: negative for a signal. killed: "time" or "memory" by our guard.
 
-    seconds: of the clock, less those that the command and the one of its processes that waited
-    longest were ready and no processor was free. cpu_s, peak_mb: of all its processes, the render
-    processes with sessions of their own too: their sum, and the largest.
+    seconds: wall time, minus the time that the command and its longest waiting process were
+    ready without a free processor. cpu_s, peak_mb: of all its processes, including render
+    processes with separate sessions: their sum, and the largest.
     """
 
     code: int
@@ -45,7 +45,7 @@ class Ended:
 
 
 def watch(words: Sequence[str], limit_s: float = LIMIT_S) -> Ended:
-    """Run `pbrs-farm WORDS` in a session of its own until it ends or a guard kills it."""
+    """Run `pbrs-farm WORDS` in a new session until it ends or a guard kills it."""
     with tempfile.TemporaryFile() as output:
         started = time.monotonic()
         process = subprocess.Popen(
@@ -61,23 +61,23 @@ def watch(words: Sequence[str], limit_s: float = LIMIT_S) -> Ended:
         delays: dict[int, float] = {}
         sessions = {str(process.pid)}
         while process.poll() is None:
-            found = _family(sessions)
-            peak_mb = max([peak_mb, *(_high_water_mb(pid) for pid in found)])
-            cpu_s = max(cpu_s, sum(_cpu_s(pid) for pid in found))
-            delays |= {pid: max(_delay_s(pid), delays.get(pid, 0.0)) for pid in found}
-            others = (d for pid, d in delays.items() if pid != process.pid)
-            waited = delays.get(process.pid, 0.0) + max(others, default=0.0)
+            family = _family(sessions)
+            peak_mb = max([peak_mb, *(_high_water_mb(pid) for pid in family)])
+            cpu_s = max(cpu_s, sum(_cpu_s(pid) for pid in family))
+            delays |= {pid: max(_delay_s(pid), delays.get(pid, 0.0)) for pid in family}
+            child_delays = (d for pid, d in delays.items() if pid != process.pid)
+            waited = delays.get(process.pid, 0.0) + max(child_delays, default=0.0)
             seconds = time.monotonic() - started - waited
             if seconds > limit_s:
                 killed = "time"
             elif peak_mb > LIMIT_MB:
                 killed = "memory"
             if killed:
-                _kill(found)
+                _kill(family)
                 break
             time.sleep(_POLL_S)
         code = process.wait()
-        _kill(_family(sessions))  # whatever it left behind
+        _kill(_family(sessions))  # processes that it left behind
         output.seek(0)
         text = output.read(4_000_000).decode("utf-8", "replace")
     return Ended(code, text, seconds, cpu_s, peak_mb, killed)
@@ -89,11 +89,11 @@ def _limit() -> None:
 
 
 def _family(sessions: set[str]) -> list[int]:
-    """The processes of a command's sessions, to which those are added that its processes began."""
+    """The processes of a command's sessions; sessions that its processes started are added."""
     rows = {int(e.name): _stat(int(e.name)) for e in Path("/proc").iterdir() if e.name.isdigit()}
     rows = {pid: fields for pid, fields in rows.items() if len(fields) > 3}
     family: set[int] = set()
-    # A process belongs to it by its parent or its session; go on until nothing is added.
+    # A process belongs to it by its parent or its session; repeat until nothing is added.
     while True:
         more = {
             pid
@@ -115,13 +115,13 @@ def _stat(pid: int) -> list[str]:
 
 
 def _cpu_s(pid: int) -> float:
-    # Its own time, and that of its children that have ended.
+    # Its time, and that of its finished children.
     fields = _stat(pid)
     return sum(int(x) for x in fields[11:15]) / os.sysconf("SC_CLK_TCK") if fields else 0.0
 
 
 def _delay_s(pid: int) -> float:
-    """Seconds that a process's main thread was ready to run and did not."""
+    """Seconds that a process's main thread was ready but not running."""
     try:
         return int(Path(f"/proc/{pid}/schedstat").read_text().split()[1]) / 1e9
     except (OSError, IndexError):
@@ -129,7 +129,7 @@ def _delay_s(pid: int) -> float:
 
 
 def _high_water_mb(pid: int) -> float:
-    """VmHWM of a process in MB; 0 when it is gone."""
+    """VmHWM of a process in MB; 0 if it has ended."""
     try:
         lines = Path(f"/proc/{pid}/status").read_text().splitlines()
     except OSError:

@@ -13,7 +13,7 @@ from tests.hostile.case import Case, Place, Words, by_verb, home, run
 from tests.hostile.sound_inputs import CHAIRS, archive, glb, scene, suncg
 from tests.read.gltf.gltf_scenes import CUBE, Scene
 from tests.read.suncg.suncg_meshes import Obj
-from tests.read.suncg.suncg_root import HOUSE, at, room, thing, write, write_room
+from tests.read.suncg.suncg_root import HOUSE, object_node, placement, room, write, write_room
 
 Point = tuple[float, float]
 
@@ -76,13 +76,13 @@ def walls(corners: Sequence[Point], thickness: float = 10.0, first: int = 0) -> 
 
 
 def room_xml(corners: Sequence[Point], name: str = "Room", more: str = "") -> str:
-    """A <room> of corners in cm."""
+    """A <room> element with corners in cm."""
     points = "".join(f"<point x='{x}' y='{y}'/>" for x, y in corners)
     return f"<room name='{name}' {more}>{points}</room>"
 
 
 def seven_cornered(corners: list[Point]) -> bytes:
-    """A home of one room of odd corners, walls along its edges."""
+    """A home with one room of odd corners and walls along its edges."""
     cm = [(100 * x + 400, 100 * y + 400) for x, y in corners]
     return archive(walls(cm), room=room_xml(cm))
 
@@ -133,12 +133,12 @@ def _suncg_fan(seed: int, place: Place) -> list[Words]:
 
 
 def _bathroom_inside(place: Place) -> list[Words]:
-    """A second room whose outline lies inside the first one's."""
+    """A second room whose outline is inside the first one's."""
 
     def edit(plain: dict[str, Any]) -> None:
         nodes = plain["levels"][0]["nodes"]
         nodes.append(room("0_17", "fr_0rm_17", [], ["Bathroom"]))
-        nodes.append(thing("0_18", "chair", at(2, 0.05, 2)))
+        nodes.append(object_node("0_18", "chair", placement(2, 0.05, 2)))
 
     house = suncg(place.folder, edit)
     write_room(house.parent.parent, "fr_0rm_17", "0_17", 1.5, 2.7, {})
@@ -146,20 +146,20 @@ def _bathroom_inside(place: Place) -> list[Words]:
 
 
 def overlapping_rooms() -> bytes:
-    """A bathroom drawn inside the living room's outline, with walls of its own."""
+    """A bathroom with its four walls inside the living room's outline."""
     inner: list[Point] = [(200, 100), (395, 100), (395, 295), (200, 295)]
     rooms = room_xml(BOX, "Living") + room_xml(inner, "Bath")
     return archive(walls(BOX) + walls(inner, first=10) + CHAIRS, room=rooms)
 
 
 def same_room_twice() -> bytes:
-    """One outline drawn twice, and once more turned round."""
+    """One outline drawn twice, and once more in reverse."""
     rooms = room_xml(BOX, "A") + room_xml(BOX, "B") + room_xml(BOX[::-1], "C")
     return archive(walls(BOX) + CHAIRS, room=rooms)
 
 
 def shell(*, inward: bool = True, overlap: bool = False) -> bytes:
-    """A room that is one box, seen from inside; overlap: a second one that shares half of it."""
+    """A room of one box, seen from inside; overlap: a second one that shares half of it."""
     s = Scene()
     box = np.array(CUBE, np.float64) * [4.0, 2.6, 3.0]
     quads = box[:, ::-1] if inward else box
@@ -172,7 +172,7 @@ def shell(*, inward: bool = True, overlap: bool = False) -> bytes:
 
 
 def materials_shell() -> bytes:
-    """A room that is one mesh; only its materials say floor, wall and ceiling."""
+    """A room of one mesh; only its materials identify floor, wall and ceiling."""
     s = Scene()
     box = (np.array(CUBE, np.float64) * [4.0, 2.6, 3.0])[:, ::-1]
     names = ("Wall", "Wall", "Ceiling", "Floor", "Wall", "Wall")
@@ -187,7 +187,7 @@ def materials_shell() -> bytes:
 
 
 def opaque_glass() -> bytes:
-    """A window whose pane is called glass and is opaque."""
+    """A window whose pane is named glass but opaque."""
     s = scene()
     s.materials.append({"name": "window glass", "alphaMode": "OPAQUE"})
     s.node("Window", mesh=s.box([1, 0.9, -0.05], [2.5, 2.1, 0.05], 0))
@@ -195,12 +195,12 @@ def opaque_glass() -> bytes:
 
 
 def no_ceilings() -> bytes:
-    """Rooms whose ceilings are not shown, under walls without a lamp."""
+    """Rooms with hidden ceilings and walls without a lamp."""
     return archive(walls(BOX) + CHAIRS, room=room_xml(BOX, "Hall", "ceilingVisible='false'"))
 
 
 def without(part: str) -> bytes:
-    """The sound scene without the nodes whose name begins with a word."""
+    """The sound scene without nodes whose name starts with a word."""
 
     def edit(document: dict[str, Any]) -> None:
         keep = [k for k, n in enumerate(document["nodes"]) if not n["name"].startswith(part)]

@@ -1,4 +1,4 @@
-"""Sound homes of every format in code, for others to spoil. Effect: sound_home and suncg write files."""
+"""Sound homes of every format in code, to be damaged by other modules. Effect: sound_home and suncg write files."""
 
 from __future__ import annotations
 
@@ -20,9 +20,9 @@ Edit = Callable[[Any], Any]
 
 def chair(number: int, x: float, y: float, height: float = 60.0, more: str = "") -> str:
     """A chair of 60 x 60 cm at (x, y) cm."""
-    given = "" if "name=" in more else "name='Chair'"
+    name = "" if "name=" in more else "name='Chair'"
     return piece(
-        f"id='{number}' catalogId='eTeks#chair' {given} x='{x}' y='{y}'"
+        f"id='{number}' catalogId='eTeks#chair' {name} x='{x}' y='{y}'"
         f" width='60' depth='60' height='{height}' {more}"
     )
 
@@ -35,12 +35,12 @@ MODELS = {"1": BOX_OBJ}
 def archive(
     body: str = WALLS + CHAIRS, contents: Mapping[str, bytes] | None = None, **more: str
 ) -> bytes:
-    """A .sh3d of a body of XML; contents beside the box model."""
+    """A .sh3d with this XML body; contents are added to the box model."""
     return sh3d(home_xml(body, **more), MODELS | dict(contents or {}))
 
 
 def sound_home(folder: Path) -> Path:
-    """Write the sound home; its path."""
+    """Write the sound home; returns its path."""
     folder.mkdir()
     path = folder / "sound.sh3d"
     path.write_bytes(archive())
@@ -57,7 +57,7 @@ def scene() -> Scene:
 
 
 def glb(edit: Edit = lambda _document: None, of: Scene | None = None) -> bytes:
-    """A scene's GLB after its JSON was edited in place (or replaced by what edit returns)."""
+    """A scene's GLB after an edit of its JSON, in place or by replacement with the returned value."""
     document, binary = parts_of_glb((of or scene()).glb())
     changed = edit(document)
     text = json.dumps(document if changed is None else changed).encode()
@@ -71,7 +71,7 @@ def parts_of_glb(data: bytes) -> tuple[dict[str, Any], bytes]:
 
 
 def glb_of_parts(text: bytes, binary: bytes) -> bytes:
-    """A GLB of a JSON text, sound or not, and a binary chunk."""
+    """A GLB of any JSON text and a binary chunk."""
     text += b" " * (-len(text) % 4)
     binary += b"\0" * (-len(binary) % 4)
     chunks = struct.pack("<II", len(text), 0x4E4F534A) + text
@@ -80,7 +80,7 @@ def glb_of_parts(text: bytes, binary: bytes) -> bytes:
 
 
 def suncg(folder: Path, edit: Edit = lambda _house: None) -> Path:
-    """A SUNCG root below folder, its house.json edited in place; the house's folder."""
+    """Write a SUNCG root below folder, with its house.json edited in place; returns the house's folder."""
     root = folder / "bad_root"
     write_root(root)
     path = root / "house" / HOUSE / "house.json"
@@ -91,7 +91,7 @@ def suncg(folder: Path, edit: Edit = lambda _house: None) -> Path:
 
 
 def png(width: int, height: int, rows: bytes | None = None) -> bytes:
-    """A PNG that claims a size; rows: its raw pixels, black ones unless given."""
+    """A PNG that claims a size; rows: its raw pixels, black by default."""
     raw = rows if rows is not None else b"".join(b"\0" + b"\0\0\0" * width for _ in range(height))
 
     def chunk(kind: bytes, data: bytes) -> bytes:

@@ -1,6 +1,6 @@
-"""Output folders spoiled after a run, for verify, sheet, classes, and for a run that goes on.
+"""Output folders damaged after a run, for verify, sheet, classes, and for a resumed run.
 
-Effects: they copy a stored root and spoil the copy.
+Effects: they copy a stored root and damage the copy.
 """
 
 from __future__ import annotations
@@ -18,11 +18,11 @@ from tests.hostile.case import ONE_VIEW, Case, Place, Words
 Spoil = Callable[[Path], None]
 
 _VERBS: Final = ("verify", "sheet", "classes", "run")
-"""What reads a stored root; by turns, since each fault is told alike by all."""
+"""Verbs that read a stored root, in turn, since all report a fault alike."""
 
 
 def cases() -> Iterator[Case]:
-    """Each file of a stored root, spoiled in each way."""
+    """Each file of a stored root, damaged in each way."""
     number = 0
     for pattern in _FILES:
         for name, spoil in _SPOILS.items():

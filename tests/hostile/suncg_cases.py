@@ -1,4 +1,4 @@
-"""SUNCG roots spoiled file by file. Effects: they write the roots."""
+"""SUNCG roots damaged file by file. Effects: they write the roots."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any, Final
 from tests.hostile.case import Case, Place, Words, run
 from tests.hostile.model_cases import pictures
 from tests.hostile.sound_inputs import suncg
-from tests.read.suncg.suncg_root import HOUSE, at, thing
+from tests.read.suncg.suncg_root import HOUSE, object_node, placement
 
 Spoil = Callable[[dict[str, Any]], Any]
 
@@ -83,9 +83,9 @@ def _json_texts() -> dict[str, bytes]:
 
 
 def _houses() -> dict[str, Spoil]:
-    far = thing("0_90", "chair", at(900, 0.05, 1))
-    many = [thing(f"0_{k}", "chair", at(2, 0.05, 1)) for k in range(100, 3000)]
-    box = {"id": "0_91", "type": "Box", "valid": 1, "transform": at(1, 0, 1)}
+    far = object_node("0_90", "chair", placement(900, 0.05, 1))
+    many = [object_node(f"0_{k}", "chair", placement(2, 0.05, 1)) for k in range(100, 3000)]
+    box = {"id": "0_91", "type": "Box", "valid": 1, "transform": placement(1, 0, 1)}
     return {
         "scale_0": _top(scaleToMeters=0),
         "scale_minus": _top(scaleToMeters=-1),
@@ -110,7 +110,7 @@ def _houses() -> dict[str, Spoil]:
         "transform_huge": _node(2, transform=[1e30] * 15 + [1]),
         "transform_projective": _node(2, transform=[1, 0, 0, 5, 0, 1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 0]),
         "far_900_m": _add(far),
-        "far_1e7_m": _node(2, transform=at(1e7, 0, 0)),
+        "far_1e7_m": _node(2, transform=placement(1e7, 0, 0)),
         "model_unknown": _node(2, modelId="nobody_has_this_one"),
         "model_path": _node(2, modelId="../../../../etc/passwd"),
         "model_number": _node(2, modelId=7),

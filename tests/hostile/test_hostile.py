@@ -1,4 +1,4 @@
-"""No input of a stranger kills a command, hangs it, fills memory, or costs a sound home beside it."""
+"""No hostile input kills a command, hangs it, fills memory, or costs a sound home beside it."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from tests.hostile.verdict import FORGED, judge
 
 @pytest.fixture(scope="module")
 def trials(tmp_path_factory: pytest.TempPathFactory) -> Trials:
-    """A sound home, run once, beside which each case is tried."""
+    """A sound home, run once; each case is tried beside it."""
     return Trials(tmp_path_factory.mktemp("hostile"))
 
 
@@ -24,7 +24,7 @@ def test_a_hostile_input_ends_in_one_line_or_a_note(case: Case, trials: Trials) 
     assert trials.judged_twice(case).what == {}
 
 
-def test_every_family_has_cases_and_every_case_a_name_of_its_own() -> None:
+def test_every_family_has_cases_and_every_case_a_unique_name() -> None:
     cases = all_cases()
     assert len(cases) > 800
     assert {case.name.partition("/")[0] for case in cases} == STRIDES.keys()

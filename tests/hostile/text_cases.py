@@ -1,4 +1,4 @@
-"""Names that strangers give: newlines, 100 kB, every alphabet, markup, paths. No effects until written."""
+"""Hostile names: newlines, 100 kB, every alphabet, markup, paths. No effects until written."""
 
 from __future__ import annotations
 
@@ -26,14 +26,14 @@ NAMES: Final = {
     "path": "../../../../tmp/hall /etc/passwd",
     "blank": " \t ",
 }
-"""What a room, a piece or a node may be called."""
+"""Names for a room, a piece or a node."""
 
 _JSON_ONLY: Final = {
     "escape": "\x1b[2J\x1b[31mHall\x07",
     "nul": "Hall\0Hall",
     "surrogate": "Hall \ud800",
 }
-"""What XML cannot say and JSON can."""
+"""Names that JSON can represent and XML cannot."""
 
 
 def cases() -> Iterator[Case]:
@@ -62,7 +62,7 @@ def _file(file: str, data: partial[bytes], place: Place) -> list[Words]:
 
 
 def _home(name: str) -> bytes:
-    """A home whose room, piece, level and texture bear the name."""
+    """A home whose room, piece, level and texture have the name."""
     quoted = quoteattr(name, {"\n": "&#10;", "\r": "&#13;", "\t": "&#9;"})
     body = CHAIRS + chair(5, 200, 150, 60, f"name={quoted}")
     return archive(WALLS + body, room=ROOM.replace("'Hall'", quoted))

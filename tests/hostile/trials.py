@@ -1,7 +1,7 @@
-"""What a stranger may hand to every verb that reads: the cases, and the trial of one in a process of its own.
+"""Hostile inputs for every verb that reads files: the cases, and the trial of one in a separate process.
 
-Every input is built in code, run beside a sound home by the command a user would type, watched for
-time and memory, and judged by what came out. Effects: a temporary folder, processes.
+Every input is built in code, run beside a sound home by the command of a user, watched for
+time and memory, and judged by its output. Effects: a temporary folder, processes.
 """
 
 from __future__ import annotations
@@ -47,7 +47,7 @@ STRIDES: Final = {
     "glb": 4, "rooms": 4, "classes": 4, "texture": 3, "mtl": 4,
     "crowd": 1, "input": 9,
 }  # fmt: skip
-"""Of a family of cases, every n-th is run unless all are asked for: what fits 12 minutes."""
+"""Of a family every n-th case is run by default, which fits 12 minutes."""
 
 NAMED: Final = (
     "file/zero.sh3d", "file/fifo.sh3d", "file/zero_camera_file", "set/light.spp=1000000000000",
@@ -73,7 +73,7 @@ def all_cases() -> list[Case]:
 
 
 def chosen_cases(parts: Sequence[str] = ()) -> list[Case]:
-    """Those whose names hold one of the parts; without parts some of every family, all where FULL=1 is set."""
+    """Cases whose name contains one of the parts; without parts some of every family, or all if FULL=1 is set."""
     cases = all_cases()
     if parts or os.environ.get("FULL"):
         return [c for c in cases if not parts or any(part in c.name for part in parts)]
@@ -81,7 +81,7 @@ def chosen_cases(parts: Sequence[str] = ()) -> list[Case]:
 
 
 class Trials:
-    """Hostile inputs beside a sound home, which is made and run once. work: a folder, left empty."""
+    """Hostile inputs beside a sound home, which is written and run once. work: a folder, left empty."""
 
     def __init__(self, work: Path) -> None:
         self._work = work
@@ -93,7 +93,7 @@ class Trials:
         self.alone_s = done.seconds
 
     def judged(self, case: Case) -> Verdict:
-        """Build a case, run it, clean up; the verdict."""
+        """Build a case, run it, clean up; returns the verdict."""
         folder = self._work / case.name.replace("/", "-")
         folder.mkdir()
         place = Place(folder, self._sound, self._stored)
@@ -106,7 +106,7 @@ class Trials:
             shutil.rmtree(folder, ignore_errors=True)
 
     def judged_twice(self, case: Case) -> Verdict:
-        """As judged; what was slow is tried again, because a busy machine makes anything slow."""
+        """As judged; a slow case is tried again, because a busy machine slows everything."""
         first = self.judged(case)
         if SLOW not in first.what:
             return first
@@ -114,7 +114,7 @@ class Trials:
 
 
 def some_of(cases: Sequence[Case]) -> list[Case]:
-    """Some of every family: every n-th, those of the worst faults, those that are named."""
+    """Some of every family: every n-th, those of the worst faults, the named ones."""
     chosen, count = [], dict.fromkeys(STRIDES, 0)
     for case in cases:
         family = case.name.partition("/")[0]

@@ -1,4 +1,4 @@
-"""What was wrong with how a command took a hostile input; no effects but reading its output folder."""
+"""Faults in a command's handling of a hostile input; no effects but reading its output folder."""
 
 from __future__ import annotations
 
@@ -13,10 +13,10 @@ from tests.hostile.process_tree import Ended
 SLOW_S: Final = 20.0
 MAX_MB: Final = 2000
 LONG_LINE: Final = 2000
-"""Characters of a printed line above which it buries what was said."""
+"""Characters of a printed line above which it hides its message."""
 
 FORGED: Final = "[   0.1 s] forged"
-"""What a forged line of the console begins with; builders put it after a newline in a name."""
+"""Start of a forged console line; builders put it after a newline in a name."""
 
 _SIGNAL: Final = re.compile(r"SIG[A-Z]{3,}|Segmentation fault|core dumped|exit code 13[0-9]")
 _STEP: Final = re.compile(r"\b(house|cameras|view|truth|opengl_\w+|light|develop|repair|read)\b")
@@ -38,7 +38,7 @@ class Verdict:
 
 
 def judge(case: Case, ends: list[Ended], out: Path, bad: str) -> Verdict:
-    """The verdict on a case. ends: one for each of its commands. bad: stem of the bad file."""
+    """The verdict on a case. ends: one per command. bad: stem of the bad file."""
     verdict = Verdict(
         case,
         seconds=max(e.seconds for e in ends),
@@ -47,36 +47,36 @@ def judge(case: Case, ends: list[Ended], out: Path, bad: str) -> Verdict:
         code=ends[0].code,
         said=_last_words(ends[0].text),
     )
-    what = verdict.what
+    figures = verdict.what
     for end in ends:
         lines = end.text.splitlines()
         if "Traceback (most recent call last)" in end.text:
-            what["tracebacks"] = lines[-1] if lines else ""
+            figures["tracebacks"] = lines[-1] if lines else ""
         named = next((x for x in lines if _EXCEPTION.search(x)), "")
-        if named and "tracebacks" not in what:
-            what["unexpected"] = named
+        if named and "tracebacks" not in figures:
+            figures["unexpected"] = named
         if end.code < 0 and not end.killed:
-            what["signals"] = f"ended by signal {-end.code}"
+            figures["signals"] = f"ended by signal {-end.code}"
         for line in lines:
             if _SIGNAL.search(line) and not (bad.lower() in line.lower() and _STEP.search(line)):
-                what["signals"] = line
+                figures["signals"] = line
         if end.killed == "time" or end.seconds > SLOW_S:
-            what["over_20_s"] = f"{end.seconds:.0f} s ({end.cpu_s:.0f} s of processor)"
+            figures["over_20_s"] = f"{end.seconds:.0f} s ({end.cpu_s:.0f} s of processor)"
         if end.peak_mb > MAX_MB:
-            what["over_2_gb"] = f"{end.peak_mb:.0f} MB"
+            figures["over_2_gb"] = f"{end.peak_mb:.0f} MB"
         if any(len(line) > LONG_LINE for line in lines):
-            what["long_lines"] = f"a line of {max(map(len, lines))} characters"
+            figures["long_lines"] = f"a line of {max(map(len, lines))} characters"
         if any(line.startswith(FORGED) for line in lines):
-            what["forged_lines"] = "a name forged a line"
+            figures["forged_lines"] = "a name forged a line"
     n_done = len({p.parents[2] for p in out.glob("*/*sound*/views/*/opengl_dl.png")})
     if n_done < case.neighbours:
-        what["lost_neighbours"] = verdict.said
+        figures["lost_neighbours"] = verdict.said
     if case.is_lossy and ends[0].code == 0 and not _NOTE.search(ends[0].text):
-        what["silent"] = "exit 0 without a note"
+        figures["silent"] = "exit 0 without a note"
     return verdict
 
 
 def _last_words(text: str) -> str:
     lines = [x.strip() for x in text.splitlines() if x.strip()]
-    told = [x for x in lines if "FAILED" in x or "pbrs-farm:" in x]
-    return " | ".join((told or lines)[-2:])
+    messages = [x for x in lines if "FAILED" in x or "pbrs-farm:" in x]
+    return " | ".join((messages or lines)[-2:])

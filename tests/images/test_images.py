@@ -1,4 +1,4 @@
-"""Pictures survive encoding bit for bit, equal pictures give equal bytes, damage is named."""
+"""Pictures survive encoding bit for bit, equal pictures give equal bytes, damage is reported."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ def test_png_gives_back_the_same_integers(shape: tuple[int, ...], dtype: type) -
     assert np.array_equal(back, pixels)
 
 
-def test_png_is_what_another_reader_reads() -> None:
+def test_another_reader_reads_our_png() -> None:
     pixels = random_pixels((6, 9, 3), np.uint8)
-    other = Image.open(io.BytesIO(images.png_from_array(pixels)))
-    assert other.mode == "RGB"
-    assert np.array_equal(np.asarray(other), pixels)
+    decoded = Image.open(io.BytesIO(images.png_from_array(pixels)))
+    assert decoded.mode == "RGB"
+    assert np.array_equal(np.asarray(decoded), pixels)
 
 
-def test_a_constant_picture_stays_what_it_is() -> None:
+def test_a_constant_picture_is_unchanged() -> None:
     pixels = np.full((4, 6), 1234, np.uint16)
     assert np.array_equal(images.array_from_png(images.png_from_array(pixels)), pixels)
 
@@ -86,8 +86,8 @@ def test_equal_layers_give_equal_bytes_in_any_order() -> None:
 def test_texture_decodes_as_another_reader_decodes_it(mode: str, kind: str) -> None:
     data = encoded(mode, kind, random_pixels((20, 30, 4), np.uint8))
     texture = images.decode_texture(data, f"wood.{kind.lower()}")
-    other = Image.open(io.BytesIO(data)).convert("RGBA" if texture.shape[2] == 4 else "RGB")
-    assert np.abs(texture.astype(int) - np.asarray(other)).max() <= 1
+    decoded = Image.open(io.BytesIO(data)).convert("RGBA" if texture.shape[2] == 4 else "RGB")
+    assert np.abs(texture.astype(int) - np.asarray(decoded)).max() <= 1
 
 
 def test_alpha_is_not_multiplied_into_the_colours() -> None:
@@ -183,7 +183,7 @@ def test_no_temporary_file_stays(tmp_path, monkeypatch: pytest.MonkeyPatch) -> N
 @pytest.mark.parametrize(
     "order", ["-Y +X", "-Y -X", "+Y +X", "+Y -X", "+X -Y", "+X +Y", "-X -Y", "-X +Y"]
 )
-def test_a_radiance_picture_is_upright_however_it_is_stored(order: str) -> None:
+def test_a_radiance_picture_is_upright_for_any_storage_order(order: str) -> None:
     upright = np.arange(1, 9, dtype=np.float32).reshape(2, 4)
     major, minor = order.split()
     # Scanlines run along the first axis, y upwards and x to the right.
@@ -198,5 +198,5 @@ def test_a_radiance_picture_is_upright_however_it_is_stored(order: str) -> None:
     head = (
         f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n{major} {lines.shape[0]} {minor} {lines.shape[1]}\n"
     )
-    found = images.decode_radiance(head.encode() + pixels.tobytes(), "sky.hdr")
-    np.testing.assert_allclose(found[..., 1], upright, rtol=0.01)
+    decoded = images.decode_radiance(head.encode() + pixels.tobytes(), "sky.hdr")
+    np.testing.assert_allclose(decoded[..., 1], upright, rtol=0.01)

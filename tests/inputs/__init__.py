@@ -1,1 +1,1 @@
-"""Writers of a house in each format that is read, for tests and benches."""
+"""Writers of a house in each supported format, for tests and benches."""

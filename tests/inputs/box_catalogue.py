@@ -11,7 +11,7 @@ from tests.generate.furnish.shelves import plain_catalogue
 
 
 def boxes() -> Catalogue:
-    """The plain catalogue, each piece a box of its size."""
+    """The plain catalogue with a box of its size for each piece."""
 
     def box(piece: Piece) -> Shape:
         w, d, h = piece.size

@@ -13,7 +13,7 @@ Picture = np.ndarray
 
 
 def waves(slope: float, n: int = 64, periods: int = 2) -> Picture:
-    """A normal map of waves along u and v, of a largest slope."""
+    """A normal map of waves along u and v with a given largest slope."""
     phase = 2 * np.pi * periods * (np.arange(n) + 0.5) / n
     y, x = np.meshgrid(slope * np.cos(phase), slope * np.sin(phase), indexing="ij")
     normals = np.stack([x, y, np.ones_like(x)], -1)
@@ -22,7 +22,7 @@ def waves(slope: float, n: int = 64, periods: int = 2) -> Picture:
 
 
 def spread(surface: Surface, per_m: float = 0.4) -> Surface:
-    """The surface with texture coordinates that span every one of its faces."""
+    """The surface with texture coordinates that span each face."""
     p = surface.positions
     uvs = per_m * np.stack([p[:, 0] + 0.6 * p[:, 1], p[:, 2] + 0.3 * p[:, 1]], -1)
     return replace(surface, uvs=uvs.astype(np.float32))

@@ -1,4 +1,4 @@
-"""Cupboards with doors and drawers, and boxes to put into their way."""
+"""Cupboards with doors and drawers, and boxes as obstacles."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from pbrs_farm.geometry.solids import box
 WIDE, DEEP = 0.6, 0.02  # of a door and of a drawer's front
 
 
-def thing(name: str, low: tuple[float, float, float], high: tuple[float, float, float]) -> Item:
+def box_item(name: str, low: tuple[float, float, float], high: tuple[float, float, float]) -> Item:
     a, b = np.array(low), np.array(high)
     return Item(name, name, ItemKind.OBJECT, "0", (box("box", (a + b) / 2, (b - a) / 2, 0),))
 
 
 def cupboard(kind: JointKind, x: float = 0.0, name: str = "cupboard") -> Item:
-    """A box of 60 cm with a front before z = 0: a door with its hinge at the left, or a drawer."""
-    body = thing("body", (x, 0, -0.5), (x + WIDE, 0.7, 0.0)).surfaces[0]
-    front = thing("front", (x + 0.0015, 0.002, 0), (x + WIDE - 0.0015, 0.698, DEEP)).surfaces[0]
+    """A box of 60 cm with a front at z = 0: a door hinged at the left, or a drawer."""
+    body = box_item("body", (x, 0, -0.5), (x + WIDE, 0.7, 0.0)).surfaces[0]
+    front = box_item("front", (x + 0.0015, 0.002, 0), (x + WIDE - 0.0015, 0.698, DEEP)).surfaces[0]
     joint = (
         Joint("front", kind, (x + 0.0015, 0, DEEP), (0, -1, 0), np.radians(110))
         if kind is JointKind.REVOLUTE

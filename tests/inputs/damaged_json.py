@@ -1,4 +1,4 @@
-"""Values and paths for damaged JSON files, and what a reader makes of them."""
+"""Values and paths for damaged JSON files, and the outcome of reading them."""
 
 from __future__ import annotations
 
@@ -13,13 +13,13 @@ from pbrs_farm.formats.house_bundle import bundle_from_house
 
 
 def assert_sound(house: House) -> None:
-    """A House that later stages can run on: it packs, so its numbers are finite."""
+    """Assert that later stages can use the House: it packs, so its numbers are finite."""
     bundle_from_house(house)
     assert all(len(r.polygon) >= 3 for r in house.rooms)
 
 
 def outcome(read_it: Callable[[], House]) -> str:
-    """ "" for a sound House, the file for a BadHouse; any other exception comes through."""
+    """ "" for a sound House, the file for a BadHouse; any other exception propagates."""
     try:
         house = read_it()
     except BadHouse as error:
@@ -40,8 +40,8 @@ values = st.recursive(
 
 
 def paths_of(plain: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
-    """Where every value of a JSON tree stands."""
-    here = [path] if path else []
+    """Paths of all values of a JSON tree."""
+    own_path = [path] if path else []
     inner = (
         plain.items()
         if isinstance(plain, dict)
@@ -49,4 +49,4 @@ def paths_of(plain: Any, path: tuple[Any, ...] = ()) -> list[tuple[Any, ...]]:
         if isinstance(plain, list)
         else ()
     )
-    return here + [p for key, value in inner for p in paths_of(value, (*path, key))]
+    return own_path + [p for key, value in inner for p in paths_of(value, (*path, key))]

@@ -1,4 +1,4 @@
-"""The items that a rasterized picture shows."""
+"""The visible items of a rasterized picture."""
 
 from dataclasses import replace
 
@@ -10,7 +10,7 @@ from pbrs_farm.raster import Rasterizer
 
 
 def items_drawn(home: House, view: Camera) -> np.ndarray:
-    """(H, W) the instance id that most of a pixel's samples show, told by pictures.
+    """(H, W) the instance id of most samples of a pixel, decoded from pictures.
 
     Each picture paints every item red, green or blue, by one digit of its number in base three.
     """

@@ -12,16 +12,16 @@ from tests.workers.small_farm import SmallFarm
 
 def renderers(farm: SmallFarm, worker: str) -> list[int]:
     """Process ids of a worker's renderers."""
-    found = []
+    renderer_ids = []
     for pid in descendants(farm.processes[worker].pid):
         words = Path(f"/proc/{pid}/cmdline").read_bytes().split(b"\0")
         if b"workers.node.renderer:make_handler" in words:
-            found.append(pid)
-    return found
+            renderer_ids.append(pid)
+    return renderer_ids
 
 
 def note(fault: str, farm: SmallFarm, repeated: int, seconds: float) -> None:
-    """A line of the chaos table; nothing is ever lost when this is reached."""
+    """Add a line to the chaos table; at this point nothing was lost."""
     path = os.environ.get("PBRS_CHAOS_TABLE")
     if path:
         row = {

@@ -1,4 +1,4 @@
-"""Squares before a camera, for flow and point tracks."""
+"""Squares in front of a camera, for flow and point tracks."""
 
 import math
 
@@ -30,6 +30,6 @@ def squares(*rows: tuple[float, float, float, float]) -> Caster:
     )  # fmt: skip
 
 
-def at(x: float, y: float = 0.0, z: float = 0.0, yaw: float = 0.0) -> Camera:
+def camera_at(x: float, y: float = 0.0, z: float = 0.0, yaw: float = 0.0) -> Camera:
     towards = np.array([math.sin(yaw), 0.0, -math.cos(yaw)])
     return Camera.look(INTRINSICS, np.array([x, y, z]), towards)

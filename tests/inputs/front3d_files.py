@@ -1,4 +1,4 @@
-"""3D-FRONT houses written in code, in the three generations that are around. Effects: writes files."""
+"""3D-FRONT houses written in code, in the three generations in circulation. Effects: writes files."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ PIECES: list[tuple[str, str, str, str, tuple[float, float, float], str, tuple[fl
     ("fridge", "appliance/refrigerator", "", "", (0.65, 0.65, 1.8), "Kitchen-2", (7.6, 3.5), 180),
     ("socket", "electric/switch - single switch", "", "", (0.08, 0.02, 0.08), "Kitchen-2", (5.2, 0.1), 0),
 ]  # fmt: skip
-N_DRAWN = len(PIECES) - 1  # a switch is not drawn
+N_DRAWN = len(PIECES) - 1  # a switch has no model
 
 
 class _Writer:
@@ -96,7 +96,7 @@ class _Writer:
 
 
 def front_house(generation: Generation = "0.11", *, picture_jid: str = "") -> dict[str, Any]:
-    """A furnished flat of six rooms, twelve openings and 19 pieces in one generation's ways."""
+    """A furnished flat of six rooms, twelve openings and 19 pieces in one generation's schema."""
     w = _Writer(generation)
     for name, (_, x0, z0, x1, z1) in ROOMS.items():
         ends = [(x0, z0), (x1, z0), (x1, z1), (x0, z1)]
@@ -200,7 +200,7 @@ def _add_hole(
 
 
 def room_at(x: float, z: float, axis: str) -> str:
-    """A room beside a hole."""
+    """Name of the room beside a hole."""
     for name, (_, x0, z0, x1, z1) in ROOMS.items():
         if x0 - 0.3 < x < x1 + 0.3 and z0 - 0.3 < z < z1 + 0.3:
             return name
@@ -208,7 +208,7 @@ def room_at(x: float, z: float, axis: str) -> str:
 
 
 def tile_walls(house: dict[str, Any], rooms: tuple[str, ...]) -> dict[str, Any]:
-    """The house with each wall of some rooms drawn as two meshes: its tiles, and the grout between."""
+    """The house with each wall of some rooms as two meshes: its tiles, and the grout between."""
     of_room = {
         child["ref"]: room for room in house["scene"]["room"] for child in room["children"]
     }  # fmt: skip
@@ -241,9 +241,9 @@ _TILE_M, _JOINT_M = (0.6, 0.3), 0.004
 def wall_face(
     a: tuple[float, float], b: tuple[float, float], *, flip: bool = False, part: str = ""
 ) -> Any:
-    """The triangles of a wall's face between two corners, less the holes that it has.
+    """The triangles of a wall's face between two corners, minus its holes.
 
-    part: "tiles" or "grout" alone of a tiled wall, "" = a plain one.
+    part: only "tiles" or "grout" of a tiled wall, "" = a plain one.
     """
     along = "x" if a[1] == b[1] else "z"
     k, across = (0, a[1]) if along == "x" else (1, a[0])
@@ -274,12 +274,12 @@ def wall_face(
                 for v, h in ((s0, y0), (s1, y0), (s1, y1), (s0, y1))
             ]
             triangles += [[p[0], p[1], p[2]], [p[0], p[2], p[3]]]
-    found = np.array(triangles)
-    return found[:, ::-1] if flip else found
+    face = np.array(triangles)
+    return face[:, ::-1] if flip else face
 
 
 def _joints(low: float, high: float, size: float) -> list[float]:
-    """The edges of the joints of tiles of a size."""
+    """Edges of the joints between tiles of a size."""
     return [
         low + k * size + side * _JOINT_M
         for k in range(int((high - low) / size) + 1)
@@ -302,14 +302,12 @@ def level_face(
         np.stack([xs[a + i], np.full(len(a), y), zs[b + j]], -1)
         for i, j in ((0, 0), (0, 1), (1, 1), (1, 0))
     ]
-    found = np.concatenate(
-        [np.stack(corner[:3], 1), np.stack([corner[0], corner[2], corner[3]], 1)]
-    )
-    return found if up else found[:, ::-1]
+    face = np.concatenate([np.stack(corner[:3], 1), np.stack([corner[0], corner[2], corner[3]], 1)])
+    return face if up else face[:, ::-1]
 
 
 def jambs(a: Any, b: Any, axis: str, low: float, high: float) -> Any:
-    """The two sides and the lintel of a hole, a sill where it does not reach the floor."""
+    """The two sides and the lintel of a hole, and a sill if it is above the floor."""
     quads = [
         [[a[0], low, a[1]], [b[0], low, a[1]], [b[0], high, a[1]], [a[0], high, a[1]]],
         [[a[0], low, b[1]], [b[0], low, b[1]], [b[0], high, b[1]], [a[0], high, b[1]]],
@@ -326,9 +324,9 @@ def write_house(
     folder: Path, generation: Generation = "0.11", *, with_models: bool = True, picture: bytes | None = None,
     n_triangles: int = 0,
 ) -> Path:  # fmt: skip
-    """3D-FRONT/<uid>.json with 3D-FUTURE-model, and with 3D-FRONT-texture where a picture is given.
+    """Write 3D-FRONT/<uid>.json with 3D-FUTURE-model, and with 3D-FRONT-texture if a picture is given.
 
-    n_triangles: of all the models together.
+    n_triangles: total of all models.
     """
     place = folder / "3D-FRONT"
     place.mkdir(parents=True, exist_ok=True)
@@ -345,7 +343,7 @@ def write_house(
 
 
 def write_models(folder: Path, n_triangles: int = 0) -> None:
-    """An OBJ of so many triangles with a shadow card below it for each piece, and model_info.json."""
+    """Write an OBJ with a shadow card for each piece, n_triangles in all, and model_info.json."""
     info = []
     for jid, _, category, above, size, *_rest in PIECES:
         place = folder / f"jid-{jid}"
@@ -365,7 +363,7 @@ def write_models(folder: Path, n_triangles: int = 0) -> None:
 
 
 def _obj(size: tuple[float, float, float], n_triangles: int = 0) -> str:
-    """Two boxes whose origin is the middle of their bottom; the front one is lower: so it has a front."""
+    """Two boxes with their origin at the bottom's middle; the front one is lower, which marks the front."""
     width, depth, height = size
     boxes = [
         ((-width / 2, 0, -depth / 2), (width / 2, height, 0)),
@@ -383,8 +381,8 @@ def _obj(size: tuple[float, float, float], n_triangles: int = 0) -> str:
             a, b, c, d = corners[list(quad)]
             for u in steps:
                 for v in steps:
-                    at = (1 - v) * ((1 - u) * a + u * b) + v * ((1 - u) * d + u * c)
-                    lines.append("v " + " ".join(f"{x:g}" for x in at))
+                    point = (1 - v) * ((1 - u) * a + u * b) + v * ((1 - u) * d + u * c)
+                    lines.append("v " + " ".join(f"{x:g}" for x in point))
             for i in range(side):
                 for j in range(side):
                     k = n + i * (side + 1) + j + 1

@@ -1,4 +1,4 @@
-"""A Habitat data set written in code, as HSSD-hab lies on a disk. Effects: writes files."""
+"""A Habitat data set written in code, in HSSD-hab's layout. Effects: writes files."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tests.inputs.front3d_files import (
 from tests.inputs.scenestate_files import model_glb
 
 _SCENE = "102344115"
-N_OPENINGS = sum(kind != "Hole" for kind, *_ in HOLES)  # a gap without a door is not told
+N_OPENINGS = sum(kind != "Hole" for kind, *_ in HOLES)  # a gap without a door is not listed
 _LABELS = ("living room", "kitchen", "hallway", "bedroom", "bathroom", "bedroom")
 # jid of a piece -> its main_category
 _CATEGORIES = {
@@ -37,7 +37,7 @@ _CATEGORIES = {
 def habitat_scene(folder: Path, n_triangles: int = 300_000) -> Path:
     """The scene_instance.json of a flat of six rooms, 18 pieces, doors and windows.
 
-    n_triangles: of all the placed things together.
+    n_triangles: total of the placed objects.
     """
     written(
         folder / "hssd.scene_dataset_config.json",
@@ -49,16 +49,16 @@ def habitat_scene(folder: Path, n_triangles: int = 300_000) -> Path:
     )
     written(folder / f"stages/{_SCENE}.stage_config.json", {"render_asset": f"{_SCENE}.glb"})
     written(folder / f"stages/{_SCENE}.glb", _stage_glb())
-    things = _things()
+    things = _objects()
     rows, placed = ["id,name,main_category"], []
     for k, (category, size, place, turn) in enumerate(things):
         model = f"{(k * 7 + 3) % 16:x}{k:039x}"
-        at = folder / "objects" / model[0]
-        written(at / f"{model}.glb", model_glb(size, n_triangles // len(things)))
+        path = folder / "objects" / model[0]
+        written(path / f"{model}.glb", model_glb(size, n_triangles // len(things)))
         config = {
             "render_asset": f"{model}.glb", "up": [0, 1, 0], "front": [0, 0, 1], "scale": [1, 1, 1],
         }  # fmt: skip
-        written(at / f"{model}.object_config.json", config)
+        written(path / f"{model}.object_config.json", config)
         rows.append(f"{model},thing,{category}")
         half = np.radians(turn) / 2
         placed.append({
@@ -80,25 +80,25 @@ def habitat_scene(folder: Path, n_triangles: int = 300_000) -> Path:
 
 
 def written(path: Path, value: Any) -> Path:
-    """The path, after its bytes or JSON were written."""
+    """Write bytes or JSON to the path; returns the path."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(value if isinstance(value, bytes) else json.dumps(value).encode())
     return path
 
 
-def _things() -> list[tuple[str, tuple[float, float, float], tuple[float, float, float], float]]:
-    """Category, (w, d, h), middle and turn of what stands in the flat, with its doors and windows."""
-    found = []
+def _objects() -> list[tuple[str, tuple[float, float, float], tuple[float, float, float], float]]:
+    """Category, (w, d, h), middle and turn of the flat's objects, including doors and windows."""
+    objects = []
     for jid, _, _, _, (w, d, h), _, (x, z), turn in PIECES:
         if jid in _CATEGORIES:
             bottom = {"pendant": 1.9, "ceiling": HEIGHT - h}.get(jid, 0.0)
-            found.append((_CATEGORIES[jid], (w, d, h), (x, bottom + h / 2, z), turn))
+            objects.append((_CATEGORIES[jid], (w, d, h), (x, bottom + h / 2, z), turn))
     for kind, _, (x, z), axis, width, low, high, _, _ in HOLES:
         if kind != "Hole":
             size = (width, 0.06, high - low)
             turn = 0.0 if axis == "x" else 90.0
-            found.append((kind.lower(), size, (x, (low + high) / 2, z), turn))
-    return found
+            objects.append((kind.lower(), size, (x, (low + high) / 2, z), turn))
+    return objects
 
 
 def _regions() -> list[dict[str, Any]]:
@@ -118,9 +118,9 @@ def _stage_glb() -> bytes:
     for _, _, (x, z), axis, width, low, high, depth, _ in HOLES:
         half = np.array([width, depth]) / 2 if axis == "x" else np.array([depth, width]) / 2
         middle = np.array([x, z])
-        found = jambs(middle - half, middle + half, axis, low, high)
+        frame = jambs(middle - half, middle + half, axis, low, high)
         centre = np.array([x, (low + high) / 2, z])
-        jambs_of[room_at(x, z, axis)].append(_facing(found, centre))
+        jambs_of[room_at(x, z, axis)].append(_facing(frame, centre))
     parts: dict[str, Any] = {}
     for k, (name, (_, x0, z0, x1, z1)) in enumerate(ROOMS.items()):
         centre = np.array([(x0 + x1) / 2, HEIGHT / 2, (z0 + z1) / 2])
@@ -154,7 +154,7 @@ def _walls(x0: float, z0: float, x1: float, z1: float) -> list[Any]:
 
 
 def _facing(triangles: Any, towards: Any) -> Any:
-    """(N, 3, 3) triangles, each turned so that its front faces a point."""
+    """(N, 3, 3) triangles, each oriented so that its front faces a point."""
     p = np.array(triangles, float)
     normal = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     away = ((towards - p[:, 0]) * normal).sum(1) < 0

@@ -1,4 +1,4 @@
-"""IFC buildings written row by row, as an architect's program exports them. Effects: writes files."""
+"""IFC buildings written row by row, like the exports of architects' programs. Effects: writes files."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ class IfcHouse:
         self.building = self.row("IfcBuilding", Name="House", ObjectPlacement=self.site_place)
         self._aggregate(self.project, [self.building])
         self.storeys: list[Any] = []
-        self._contained: dict[int, list[Any]] = {}
+        self.contained: dict[int, list[Any]] = {}
         self.styles: dict[str, Any] = {}
 
     def row(self, entity: str, **fields: Any) -> Any:
@@ -51,12 +51,12 @@ class IfcHouse:
         self.row("IfcRelAggregates", RelatingObject=whole, RelatedObjects=parts)
 
     def storey(self, name: str, elevation: float | None) -> Any:
-        """A storey; what is added afterwards belongs to it."""
+        """A storey; rows added afterwards belong to it."""
         height = None if elevation is None else elevation / self.scale
-        found = self.row("IfcBuildingStorey", Name=name, Elevation=height)
-        self._aggregate(self.building, [found])
-        self.storeys.append(found)
-        return found
+        storey = self.row("IfcBuildingStorey", Name=name, Elevation=height)
+        self._aggregate(self.building, [storey])
+        self.storeys.append(storey)
+        return storey
 
     def style(self, name: str, rgb: Any, transparency: float = 0.0) -> str:
         m = self.model
@@ -112,13 +112,13 @@ class IfcHouse:
         self, entity: str, name: str, solids: Any, place: Any = (0, 0, 0), turn: float = 0.0,
         inside: Any = None, **fields: Any,
     ) -> Any:  # fmt: skip
-        """A product with solids in its own frame, in the last storey or in a space."""
+        """A product with solids in its local frame, in the last storey or in a space."""
         m = self.model
         is_mesh = any(s.is_a("IfcTriangulatedFaceSet") for s in solids)
         kind = "Tessellation" if is_mesh else "SweptSolid"
         shape = m.createIfcShapeRepresentation(self.context, "Body", kind, list(solids))
         body = m.createIfcProductDefinitionShape(None, None, [shape])
-        found = self.row(
+        entity_row = self.row(
             entity,
             Name=name,
             ObjectPlacement=self._placement(place, turn),
@@ -126,16 +126,16 @@ class IfcHouse:
             **fields,
         )
         if entity == "IfcSpace":
-            self._aggregate(self.storeys[-1], [found])
+            self._aggregate(self.storeys[-1], [entity_row])
         elif entity != "IfcOpeningElement":
             where = inside or self.storeys[-1]
-            self._contained.setdefault(where.id(), []).append(found)
-        return found
+            self.contained.setdefault(where.id(), []).append(entity_row)
+        return entity_row
 
     def wall(
         self, name: str, start: Any, end: Any, bottom: float, height: float, thick: float = 0.2
     ) -> Any:
-        """A wall of its own frame, x from start to end, thick to the left."""
+        """A wall in its local frame, x from start to end, thick to the left."""
         a, b = np.array(start, float), np.array(end, float)
         length = float(np.linalg.norm(b - a))
         turn = float(np.arctan2(*(b - a)[::-1]))
@@ -149,18 +149,20 @@ class IfcHouse:
     ) -> Any:
         """A hole through a wall, in the wall's frame."""
         solid = self.box_solid((0, -0.1, 0), (width, thick + 0.1, height))
-        found = self.product("IfcOpeningElement", "hole", [solid])
+        opening = self.product("IfcOpeningElement", "hole", [solid])
         place = self.model.createIfcAxis2Placement3D(self._point((along, 0, sill)))
-        found.ObjectPlacement = self.model.createIfcLocalPlacement(wall.ObjectPlacement, place)
-        self.row("IfcRelVoidsElement", RelatingBuildingElement=wall, RelatedOpeningElement=found)
-        return found
+        opening.ObjectPlacement = self.model.createIfcLocalPlacement(wall.ObjectPlacement, place)
+        self.row("IfcRelVoidsElement", RelatingBuildingElement=wall, RelatedOpeningElement=opening)
+        return opening
 
     def fill(self, hole: Any, entity: str, name: str, solids: Any, **fields: Any) -> Any:
         """A door or window in a hole, in the hole's frame."""
-        found = self.product(entity, name, solids, **fields)
-        found.ObjectPlacement = self.model.createIfcLocalPlacement(hole.ObjectPlacement, self.axes)
-        self.row("IfcRelFillsElement", RelatingOpeningElement=hole, RelatedBuildingElement=found)
-        return found
+        filling = self.product(entity, name, solids, **fields)
+        filling.ObjectPlacement = self.model.createIfcLocalPlacement(
+            hole.ObjectPlacement, self.axes
+        )
+        self.row("IfcRelFillsElement", RelatingOpeningElement=hole, RelatedBuildingElement=filling)
+        return filling
 
     def door(
         self, wall: Any, along: float, width: float = 0.9, height: float = 2.05, **fields: Any
@@ -185,12 +187,12 @@ class IfcHouse:
         return self.product("IfcSpace", name, [solid], LongName=name)
 
     def text(self) -> str:
-        for number, rows in self._contained.items():
+        for number, rows in self.contained.items():
             self.row(
                 "IfcRelContainedInSpatialStructure", RelatedElements=rows,
                 RelatingStructure=self.model.by_id(number),
             )  # fmt: skip
-        self._contained = {}
+        self.contained = {}
         return str(self.model.to_string())
 
     def save(self, path: Path) -> Path:
@@ -234,7 +236,7 @@ def attic(
     """A room of 6 x 5 m under two slabs that slope by 45 degrees up to a ridge along x.
 
     knee: height of the walls under the eaves. is_box: the space is a box up to the ridge, else it ends
-    at the slabs. roof: entity and the two slabs' names, none for no roof. fields: of the slabs.
+    at the slabs. roof: entity and the two slabs' names, empty for no roof. fields: of the slabs.
     """
     house.storey("Attic", 0.0)
     ridge = knee + 2.5
@@ -265,7 +267,7 @@ def attic(
 
 
 def _prism_along_x(outline: Any, x0: float, x1: float) -> tuple[Any, Any]:
-    """(points, triangles) of a convex outline in (y, z), counter-clockwise, drawn out from x0 to x1."""
+    """(points, triangles) of a convex outline in (y, z), counter-clockwise, extruded from x0 to x1."""
     n = len(outline)
     points = [(x, y, z) for x in (x0, x1) for y, z in outline]
     caps = [(0, k + 1, k) for k in range(1, n - 1)] + [

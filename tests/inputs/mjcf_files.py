@@ -1,10 +1,10 @@
-"""A home as a model of MuJoCo, as simulators' homes are written. Effects: writes files."""
+"""A home as a MuJoCo model, in the style of simulators' homes. Effects: writes files."""
 
 from __future__ import annotations
 
 from pathlib import Path
 
-# A room of 4 x 3 m whose floor is a plane without an end, as simulators' are.
+# A room of 4 x 3 m whose floor is an infinite plane, as in simulators.
 ROOM = """
     <geom name="floor" type="plane" size="0 0 .01"/>
     <geom name="wall_n" type="box" pos="2 3.05 1.25" size="2.1 .05 1.25" rgba="1 0 0 1"/>
@@ -12,7 +12,7 @@ ROOM = """
     <geom name="wall_w" type="box" pos="-.05 1.5 1.25" size=".05 1.5 1.25"/>
     <geom name="wall_e" type="box" pos="4.05 1.5 1.25" size=".05 1.5 1.25"/>
     <geom name="ceiling" type="box" pos="2 1.5 2.55" size="2.1 1.6 .05"/>"""
-# A fridge whose door is hinged at its right front edge, and a drawer that opens to its negative side.
+# A fridge whose door is hinged at its right front edge, and a drawer with a negative range.
 THINGS = """
     <body name="fridge_1" pos="1 2.6 .9">
       <geom type="box" size=".3 .3 .9"/>
@@ -33,7 +33,7 @@ THINGS = """
 def write_model(
     folder: Path, world: str = ROOM + THINGS, more: str = "", name: str = "home.xml"
 ) -> Path:
-    """The model of a home. world: what stands in it; more: elements before it."""
+    """Write the model of a home. world: its bodies; more: elements before them."""
     path = folder / name
     path.parent.mkdir(parents=True, exist_ok=True)
     head = '<mujoco><compiler angle="radian"/>'

@@ -1,7 +1,7 @@
 """One realistic home as a file of each format of floor plans; effects: each writer writes its file.
 
 The home is the same in all: a living room with a kitchen beside it, a bedroom, a bathroom and a hall,
-8.4 m by 7 m, five doors and four windows, and what stands in it. x runs right, z down the page.
+8.4 m by 7 m, five doors and four windows, and furniture. x runs right, z down the page.
 """
 
 from __future__ import annotations
@@ -32,13 +32,13 @@ class SampleHole(NamedTuple):
     at: tuple[float, float]
     width: float
     along_x: bool
-    rooms: tuple[int, ...]  # beside it; one = outside
+    rooms: tuple[int, ...]  # adjacent rooms; a single one: the outdoors is on the other side
 
 
 class SampleThing(NamedTuple):
-    """A thing; its front looks along `front` (x, z)."""
+    """A piece of furniture; its front faces `front` (x, z)."""
 
-    name: str  # as SpatialLM has it
+    name: str  # in SpatialLM's words
     at: tuple[float, float]
     low: float
     size: tuple[float, float, float]  # width, depth, height
@@ -79,7 +79,7 @@ THINGS: Final = (
 
 
 def write_own(folder: Path) -> Path:
-    """A plan of one's own."""
+    """A user's plan."""
     value = {"height": HEIGHT, "rooms": [{"type": r.type, "polygon": _ring(r)} for r in ROOMS],
              "doors": [_own(h) for h in HOLES if h.kind != "window"],
              "windows": [_own(h) for h in HOLES if h.kind == "window"]}  # fmt: skip
@@ -140,7 +140,7 @@ def write_swiss(folder: Path, name: str = "geometries.csv") -> Path:
 
 
 def write_spatial_lm(folder: Path) -> Path:
-    """A layout of all rooms; floors at z = 4.85, walls in no order, ends some centimetres apart."""
+    """A layout of all rooms; floors at z = 4.85, unordered walls with ends some centimetres apart."""
     lines, up = [], 4.85
     walls = _walls()
     for k, (a, b) in enumerate(walls):
@@ -166,7 +166,7 @@ def write_spatial_lm(folder: Path) -> Path:
 
 
 def write_procthor(folder: Path) -> Path:
-    """A house of schema 1.0.0, left-handed, with the table of its assets' sizes beside it."""
+    """A house of schema 1.0.0, left-handed, beside the table of its assets' sizes."""
     rooms, walls = [], []
     types = {"living": "LivingRoom", "hall": "LivingRoom"}
     for k, room in enumerate(ROOMS):
@@ -210,7 +210,7 @@ def write_procthor(folder: Path) -> Path:
 
 
 def write_room_plan(folder: Path) -> Path:
-    """A scan with transforms by column; walls stop 4 cm short of each other."""
+    """A scan with column-major transforms; walls end 4 cm short of each other."""
     surfaces: dict[str, list[Any]] = {"walls": [], "doors": [], "windows": [], "openings": []}
     for a, b in _walls():
         length = math.dist(a, b) - 0.08
@@ -394,11 +394,11 @@ WRITERS: Final[dict[str, Callable[[Path], Path]]] = {
     "blueprint3d": write_blueprint3d,
 }  # fmt: skip
 TELLING: Final = ("swiss", "spatiallm", "procthor", "roomplan", "cubicasa", "react-planner")
-"""Formats that tell of things."""
+"""Formats with furniture."""
 
 
 def traced(value: dict[str, Any], px_per_cm: float) -> dict[str, Any]:
-    """A react-planner home as one is that was traced: pixels, outlines, an area for a scale."""
+    """The react-planner home as if traced: pixels, outlines, an area for the scale."""
     layer = value["layers"]["layer-1"]
     points = {
         name: (v["x"] * px_per_cm, v["y"] * px_per_cm) for name, v in layer["vertices"].items()
@@ -430,9 +430,9 @@ def traced(value: dict[str, Any], px_per_cm: float) -> dict[str, Any]:
 
 
 def with_a_stub(value: dict[str, Any]) -> tuple[dict[str, Any], list[tuple[float, float]]]:
-    """A ZInD home of one room, into which a stub of wall comes from above; and the room's corners.
+    """A ZInD home of one room with a stub of wall from above; and the room's corners.
 
-    It is 11 cm thick and 1.2 m long; the file's ring ends where it begins, but for rounding.
+    It is 11 cm thick and 1.2 m long; the file's ring is closed, except for rounding.
     """
     ring = [
         (0.0, 0.0),

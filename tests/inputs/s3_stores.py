@@ -13,11 +13,11 @@ from pbrs_farm.store import Store, store_from_url
 
 
 def s3_store() -> Store:
-    """A fresh prefix in the bucket the environment names; skips when it names none."""
+    """A fresh prefix in the bucket that the environment names; skips without one."""
     endpoint = os.environ.get("PBRS_S3_ENDPOINT")
     if not endpoint:
         pytest.skip("PBRS_S3_ENDPOINT is not set")
-    found = settings_from_environment().store
-    settings = replace(found, s3=replace(found.s3, retry_timeout_s=5.0))
+    url = settings_from_environment().store
+    settings = replace(url, s3=replace(url.s3, retry_timeout_s=5.0))
     bucket = os.environ.get("PBRS_S3_BUCKET", "pbrs")
     return store_from_url(f"s3://{bucket}/t-{secrets.token_hex(4)}", settings)

@@ -1,4 +1,4 @@
-"""sceneState files written in code: like HSSD's, like Rent3D++'s, like a generator's. Effects: writes files."""
+"""sceneState files written in code, in the style of HSSD, Rent3D++ and a generator. Effects: writes files."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from typing import Any
 import numpy as np
 
 HEIGHT, DEPTH, BELOW = 2.75, 0.15, 0.05
-# (x0, y0, x1, y1), type: two bedrooms and a bath behind, living and kitchen before, a hall between.
+# (x0, y0, x1, y1), type: two bedrooms and a bath at the back, living and kitchen in front, a hall
+# between.
 ROOMS = {
     "living": ((0.0, 0.0, 5.0, 4.0), "living room"),
     "kitchen": ((5.0, 0.0, 8.0, 4.0), "kitchen"),
@@ -43,7 +44,7 @@ _WALLS: list[tuple[tuple[float, float], tuple[float, float], list[str], list[tup
     ((4, 5.4), (4, 9), ["bedroom", "bath"], []),
     ((6, 5.4), (6, 9), ["bath", "study"], []),
 ]  # fmt: skip
-N_OPENINGS = 11  # the door from the living room to the hall is told by both
+N_OPENINGS = 11  # both rooms list the door from the living room to the hall
 # category, (x, y), size (w, d, h), degrees about up
 _THINGS = [
     ("couch", (2.2, 0.6), (2.0, 0.9, 0.8), 180), ("table", (2.2, 1.9), (1.1, 0.6, 0.42), 0),
@@ -58,7 +59,7 @@ _THINGS = [
 
 
 def hssd_like(folder: Path, *, with_models: bool = True, triangles: int = 12) -> Path:
-    """Six rooms, z up, walls told for one room or two; 20 objects whose models lie in folder/objects."""
+    """Six rooms, z up, walls listed for one room or two; 20 objects with models in folder/objects."""
     elements: list[dict[str, Any]] = []
     for k, (start, end, rooms, holes) in enumerate(_WALLS):
         elements.append({
@@ -151,7 +152,7 @@ def rent3d_like(picture: bytes | None = None) -> dict[str, Any]:
 
 
 def generated() -> dict[str, Any]:
-    """A generator's room: four thin walls, a floor, z up and untold; no ceiling, room, hole or model."""
+    """A generator's room: four thin walls, a floor, z up but undeclared; no ceiling, room, hole or model."""
     ring = [[0, 0, 0], [4.5, 0, 0], [4.5, 3.5, 0], [0, 3.5, 0]]
     walls = [
         {"id": f"wall|{k}", "type": "Wall", "points": [ring[k], ring[(k + 1) % 4]], "height": 2.7, "depth": 0.025}
@@ -181,7 +182,7 @@ def _hole(n: int, hole: tuple[str, float, float, float, float]) -> dict[str, Any
 
 
 def _write_table(path: Path, rows: list[tuple[str, str, str]]) -> None:
-    """objects.csv as HSSD has it: the id first, the category 15th."""
+    """objects.csv in HSSD's layout: the id first, the category 15th."""
     head = [
         "id", "name", *(f"c{k}" for k in range(2, 13)), "aligned.dims", "main_category", "notes",
     ]  # fmt: skip
@@ -192,7 +193,7 @@ def _write_table(path: Path, rows: list[tuple[str, str, str]]) -> None:
 
 
 def model_glb(size: tuple[float, float, float], triangles: int = 12) -> bytes:
-    """A box with y up and its front at +z, its middle in the origin; each face in a grid of triangles."""
+    """A box with y up and its front at +z, centred on the origin; each face is a grid of triangles."""
     width, depth, height = size
     n = max(int(np.sqrt(triangles / 12)), 1)
     u, v = np.meshgrid(np.arange(n), np.arange(n))

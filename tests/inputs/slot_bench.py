@@ -1,4 +1,4 @@
-"""A slot of a worker with a clock and processes that are made up."""
+"""A slot of a worker with a fake clock and fake processes."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ TASK = "h0/0/gl"
 
 
 class Bench:
-    """One slot; `next` is the process that it starts next."""
+    """One slot; `next` is the next process that it will start."""
 
     def __init__(self, folder: Path) -> None:
         self.clock = FakeClock()

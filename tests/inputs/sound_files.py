@@ -1,4 +1,4 @@
-"""The realistic house of each format that is read, by the title of its entry in prepare/formats.py. Effects: files."""
+"""The realistic house of each supported format, by the title of its entry in prepare/formats.py. Effects: files."""
 
 from __future__ import annotations
 
@@ -14,15 +14,15 @@ Write = Callable[[Path], Path]
 
 
 class SoundFile(NamedTuple):
-    """How a house of a format is written, and how many doors and windows it tells."""
+    """A writer of a format's house, and the number of doors and windows it lists."""
 
     write: Write  # folder -> the file to be read
-    n_openings: int = 0  # 0 = the format's writer does not say
+    n_openings: int = 0  # 0 = unknown
     models: Callable[[Path], Path] | None = None  # the file -> the folder of its models
 
 
 def sound_files(n_triangles: int = N_TRIANGLES) -> dict[str, SoundFile]:
-    """Title of a format -> its house; meshes have about as many triangles where the format has any."""
+    """Title of a format -> its house; meshes have about n_triangles if the format has meshes."""
     from pbrs_farm.export.export_homes import export_house
     from pbrs_farm.read.builtin.builtin_home import builtin_home
     from tests.inputs import (
@@ -73,7 +73,7 @@ def sound_files(n_triangles: int = N_TRIANGLES) -> dict[str, SoundFile]:
 
 
 def every_format() -> dict[str, Write]:
-    """Title of every format of the table -> what writes a small house of it into a folder."""
+    """Title of every format of the table -> writer of a small house into a folder."""
     from tests.read import textured_sources
 
     def sweethome3d(folder: Path) -> Path:

@@ -1,4 +1,4 @@
-"""A farm with made-up renderers, and jobs submitted to it."""
+"""A farm with fake renderers, and jobs submitted to it."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def submit(farm: Farm) -> Drive:
 
 
 def environment(farm: Farm, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The farm as the command line finds it."""
+    """Set the environment so that the command line finds the farm."""
     monkeypatch.setenv("PBRS_REDIS_URL", farm.config.redis_url.reveal())
     monkeypatch.setenv("PBRS_STORE", farm.config.store_url)
     monkeypatch.setenv("PBRS_FARM_PREFIX", farm.config.prefix)

@@ -12,7 +12,7 @@ from tests.read.suncg.suncg_root import HOUSE
 
 
 def arch_json() -> dict[str, Any]:
-    """Room 0_0, 4 x 3 m, as v2 writes it: walls by two points, slabs by polygons."""
+    """Room 0_0, 4 x 3 m, in v2: walls by two points, slabs by polygons."""
     ring = [[0, 0, 0], [4, 0, 0], [4, 0, 3], [0, 0, 3]]
     paint = [{"name": "inside", "diffuse": "#ff0000"}, {"name": "outside", "texture": "stone"}]
     walls = [

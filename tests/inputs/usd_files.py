@@ -1,4 +1,4 @@
-"""OpenUSD homes written with the library, as robots' simulators have them. Effects: writes files."""
+"""OpenUSD homes written with the library, in the style of robots' simulators. Effects: writes files."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ THICK = 0.12
 
 
 class UsdHome:
-    """A stage under construction: z up, a unit of its own, lengths given in metres."""
+    """A stage under construction: z up, a custom unit, lengths given in metres."""
 
     def __init__(self, path: Path, metres_per_unit: float = 1.0, up: str = "Z") -> None:
         self.path, self.unit = path, metres_per_unit
@@ -36,7 +36,7 @@ class UsdHome:
         return Vt.Vec3fArray.FromNumpy(np.ascontiguousarray(p, np.float32))
 
     def quads(self, path: str, quads: Any, label: str = "", material: Any = None) -> Any:
-        """A mesh of quads (N, 4, 3), world; uv 0..1 on each, a corner its own."""
+        """A mesh of quads (N, 4, 3), world; uv 0..1 on each, unshared corners."""
         mesh = UsdGeom.Mesh.Define(self.stage, path)
         p = np.asarray(quads, np.float64).reshape(-1, 4, 3)
         mesh.CreatePointsAttr(self.points(p))

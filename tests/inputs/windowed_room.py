@@ -1,4 +1,4 @@
-"""A room with a window whose frame stands apart from its wall."""
+"""A room with a window whose frame is apart from its wall."""
 
 from __future__ import annotations
 

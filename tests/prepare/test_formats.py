@@ -1,4 +1,4 @@
-"""The table of formats: each is known by its file, alone and in a folder, for `run` and `submit` alike."""
+"""The table of formats: each is recognised by its file, alone and in a folder, by `run` and `submit`."""
 
 from __future__ import annotations
 
@@ -53,19 +53,19 @@ each_format = pytest.mark.parametrize("title", [one.title for one in formats()])
 
 
 def test_every_format_of_the_table_is_tried_here() -> None:
-    assert {one.title for one in formats()} == set(WRITERS)
+    assert {entry.title for entry in formats()} == set(WRITERS)
 
 
 @pytest.mark.quick(8)
 @each_format
-def test_a_file_is_known_by_its_own_format_and_read(tmp_path: Path, title: str) -> None:
+def test_a_file_is_recognised_by_its_format_and_read(tmp_path: Path, title: str) -> None:
     path = WRITERS[title](tmp_path)
     entry = format_of_file(path)
     assert entry is not None
-    (own,) = (one for one in formats() if one.title == title)
-    assert entry.kind == own.kind
+    (file_format,) = (row for row in formats() if row.title == title)
+    assert entry.kind == file_format.kind
     source = resolve(str(path))
-    assert source.kind == own.kind
+    assert source.kind == file_format.kind
     assert source.given.path == path.resolve()
     assert read_house(source, ReadFields()).rooms
 
@@ -80,7 +80,7 @@ def test_a_folder_names_its_homes_to_run_and_submit_alike(tmp_path: Path, title:
     (folder / "table.csv").write_text("a,b\n1,2\n")
     (folder / "home.rooms.json").write_text('{"rooms": []}')
     (folder / ".hidden.sh3d").write_bytes(b"")
-    # Both verbs take a folder through one function; each word is a home that resolves.
+    # Both verbs expand a folder through one function; each word is a home that resolves.
     words = home_arguments([str(folder)], None)
     assert str(path) in words
     assert words == words_of_homes(words), "a home stays what it is"
@@ -97,10 +97,10 @@ def test_a_file_travels_to_a_farm_or_is_left_in_place(tmp_path: Path, title: str
     upload(store, [ref])
     placed = SourceRef.model_validate_json(entry.source)
     if is_left_in_place(ref):
-        own = format_of_source(ref)
-        assert own is not None
+        source_format = format_of_source(ref)
+        assert source_format is not None
         assert placed == ref
-        assert ref.companions or not own.travels
+        assert ref.companions or not source_format.travels
     else:
         assert store.get(placed.location) == path.read_bytes()
 
@@ -110,15 +110,15 @@ def test_a_file_travels_to_a_farm_or_is_left_in_place(tmp_path: Path, title: str
 def test_run_and_a_worker_of_a_farm_make_the_house_of_a_file(
     tmp_path: Path, title: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # Repair takes a minute of such houses, and knows nothing of formats.
+    # Repair of such houses takes a minute, and does not depend on formats.
     monkeypatch.setattr("pbrs_farm.repair.repair", _declared_repaired)
     monkeypatch.setattr(house_runner, "steps_before_views", lambda _spec, _house: ("house",))
     path = WRITERS[title](tmp_path)
     ((entry, ref),) = entries_from_arguments([str(path)])
     recipe = recipe_from_name("preview")
-    here, farm = MemoryStore(), MemoryStore()
-    run_step("house", Work(here, recipe, ref.house_id, HouseCache(), source=resolve(str(path))))
-    # Submit it, and let a worker make it of what is in the store.
+    local, farm = MemoryStore(), MemoryStore()
+    run_step("house", Work(local, recipe, ref.house_id, HouseCache(), source=resolve(str(path))))
+    # Submit it, and let a worker make it from the files in the store.
     _houses, spec = completed([entry], new_spec(recipe, modes=("opengl_dl",)))
     farm.put(job_key(spec.job_id), spec.model_dump_json().encode())
     upload(farm, [ref])
@@ -127,8 +127,8 @@ def test_run_and_a_worker_of_a_farm_make_the_house_of_a_file(
     )
     house_runner.HouseRunner(farm, n_threads=1).run(request, lambda _text: None)
     name = keys.house_key(ref.house_id, "house.json")
-    assert json.loads(here.get(name))["id"] == ref.house_id
-    assert here.get(name) == farm.get(name)
+    assert json.loads(local.get(name))["id"] == ref.house_id
+    assert local.get(name) == farm.get(name)
 
 
 def _declared_repaired(house: House, **_given: object) -> tuple[House, RepairReport]:
@@ -144,7 +144,7 @@ def test_a_byte_order_mark_before_a_text_changes_nothing(tmp_path: Path, title: 
         if _is_text(file.read_bytes()):
             file.write_bytes(codecs.BOM_UTF8 + file.read_bytes())
     if title == "OpenUSD":
-        # The library refuses such a file, and says why.
+        # The library refuses such a file with a reason.
         with pytest.raises(BadHouse, match="BOM"):
             _what_is_read(path)
         return
@@ -166,15 +166,15 @@ def _what_is_read(path: Path) -> list[object]:
     return [items, rooms, house.notes, [(m.kind, m.diffuse) for m in house.materials]]
 
 
-def test_a_range_and_a_folder_are_one_word_a_home(tmp_path: Path) -> None:
+def test_a_range_and_a_folder_become_one_word_per_home(tmp_path: Path) -> None:
     for name in ("b.glb", "a.sh3d"):
         (tmp_path / name).write_bytes(b"")
-    found = words_of_homes(["builtin", "made:2..3", str(tmp_path)])
+    words = words_of_homes(["builtin", "made:2..3", str(tmp_path)])
     homes = [str(tmp_path / name) for name in ("a.sh3d", "b.glb")]
-    assert found == ["builtin", "made:2", "made:3", *homes]
+    assert words == ["builtin", "made:2", "made:3", *homes]
 
 
-def test_a_folder_without_a_home_says_what_is_read(tmp_path: Path) -> None:
+def test_a_folder_without_a_home_lists_the_readable_formats(tmp_path: Path) -> None:
     assert words_of_homes([str(tmp_path)]) == [str(tmp_path)]
     with pytest.raises(BadHouse, match="no home file") as error:
         resolve(str(tmp_path))
@@ -183,14 +183,14 @@ def test_a_folder_without_a_home_says_what_is_read(tmp_path: Path) -> None:
         assert word in summary()
 
 
-def test_a_folder_of_homes_is_no_home_where_one_is_looked_at(tmp_path: Path) -> None:
+def test_a_folder_of_homes_is_refused_where_one_home_is_needed(tmp_path: Path) -> None:
     (tmp_path / "a.glb").write_bytes(b"")
     (tmp_path / "b.sh3d").write_bytes(b"")
     with pytest.raises(BadHouse, match="is a folder of 2 homes"):
         resolve(str(tmp_path))
 
 
-def test_a_folder_whose_homes_lie_one_folder_deeper_names_the_command_that_takes_them(
+def test_a_folder_with_homes_one_level_deeper_names_the_right_command(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for name in ("two words/b.glb", "one/a.sh3d", "empty/notes.txt", ".hidden/c.sh3d"):
@@ -201,14 +201,14 @@ def test_a_folder_whose_homes_lie_one_folder_deeper_names_the_command_that_takes
     command = shlex.join(["pbrs-farm", "run", str(tmp_path / "one"), str(tmp_path / "two words")])
     expected = f"the homes are one folder deeper, in one and two words: `{command}`"
     assert expected in str(error.value)
-    # The error of the folder says it; no warning before it.
+    # The folder's error covers it, without an earlier warning.
     assert home_arguments([str(tmp_path)], None) == [str(tmp_path)]
     assert capsys.readouterr().err == ""
-    # Beside a home it is a warning, and what lies deeper is not taken.
+    # Next to a home it is a warning, and deeper files are ignored.
     (tmp_path / "top.sh3d").write_bytes(b"")
     assert home_arguments([str(tmp_path)], None) == [str(tmp_path / "top.sh3d")]
     assert expected in capsys.readouterr().err
-    # Of more folders than a line should hold it is the shell's pattern.
+    # Too many folders for one line are written as the shell's pattern.
     for name in "abc":
         (tmp_path / name).mkdir()
         (tmp_path / name / "home.sh3d").write_bytes(b"")
@@ -216,7 +216,7 @@ def test_a_folder_whose_homes_lie_one_folder_deeper_names_the_command_that_takes
     assert f"`pbrs-farm run {tmp_path}/*/`" in capsys.readouterr().err
 
 
-def test_a_file_that_is_not_there_is_missing_in_its_own_format(tmp_path: Path) -> None:
+def test_a_missing_file_is_reported_by_its_format(tmp_path: Path) -> None:
     for name in ("a.usd", "a.glb", "a.sh3d", "a.thing"):
         with pytest.raises(BadHouse, match="no such file"):
             resolve(str(tmp_path / name))
@@ -230,7 +230,7 @@ def test_kinds_without_files_have_no_format() -> None:
     assert plan.has_box_only_items
 
 
-def test_a_format_that_lacks_its_library_stays_in_the_table_with_what_to_type() -> None:
+def test_a_format_without_its_library_stays_listed_with_the_install_command() -> None:
     usd = format_of_kind("usd")
     assert usd is not None
     lacking = replace(usd, library="no_such_module")
@@ -272,7 +272,7 @@ FORMAT = Format(
 
 @pytest.fixture
 def with_lidar(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[None]:
-    """A format that is one more folder in read/, of one file."""
+    """A format added as one folder in read/ with one file."""
     from pbrs_farm import read
 
     (tmp_path / "packages/lidar").mkdir(parents=True)
@@ -294,7 +294,7 @@ def test_a_format_is_added_in_one_file(tmp_path: Path) -> None:
     assert (source.kind, house.name, house.is_repaired) == ("lidar", "Scanned", True)
     assert words_of_homes([str(tmp_path)]) == [str(path)]
     assert ".lidar" in summary()
-    # It travels to a farm as any other file.
+    # It is uploaded to a farm like any other file.
     ((entry, ref),) = entries_from_arguments([str(path)])
     store = MemoryStore()
     upload(store, [ref])

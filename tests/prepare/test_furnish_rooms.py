@@ -1,4 +1,4 @@
-"""Empty rooms of a home that was read get furniture; rooms with some keep theirs."""
+"""Empty rooms of a read home get furniture; furnished rooms keep theirs."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def empty_house() -> House:
 
 
 def turned(house: House, angle: float) -> House:
-    """The house about its origin, walls and rooms askew."""
+    """The house turned about its origin, with oblique walls and rooms."""
     cos, sin = math.cos(angle), math.sin(angle)
 
     def at(points: F64) -> F64:
@@ -51,7 +51,7 @@ def turned(house: House, angle: float) -> House:
 
 
 @pytest.mark.parametrize("angle", [0.0, 0.4])
-def test_every_room_gets_what_it_must_have_inside_its_outline(angle: float) -> None:
+def test_every_room_gets_its_required_furniture_inside_its_outline(angle: float) -> None:
     house = turned(empty_house(), angle)
     furnished = furnish_rooms(house, boxes(), 1)
     added = furnished.items[len(house.items) :]
@@ -65,7 +65,7 @@ def test_every_room_gets_what_it_must_have_inside_its_outline(angle: float) -> N
         assert item.bounds[1, 1] <= room.ceiling_y + 1e-3
 
 
-def test_a_room_that_has_furniture_keeps_it_and_gets_none() -> None:
+def test_a_furnished_room_is_unchanged() -> None:
     once = furnish_rooms(empty_house(), boxes(), 1)
     again = furnish_rooms(once, boxes(), 2)
     rooms = [r for r in once.rooms if {"bed", "sofa", "sink"} & names_in(once, r.id)]
@@ -78,13 +78,13 @@ def names_in(house: House, room: str) -> set[str]:
 
 
 def renamed(house: House, name: str, new: str) -> House:
-    """The house with another name for the room of a name, of which its use follows."""
+    """The house with a room renamed, which changes its use."""
     types = (new,) if new else ()
     rooms = tuple(replace(r, name=new, types=types) if r.name == name else r for r in house.rooms)
     return replace(house, rooms=rooms)
 
 
-def test_a_room_whose_use_is_not_known_is_left_and_noted() -> None:
+def test_a_room_of_unknown_use_is_left_with_a_note() -> None:
     house = renamed(empty_house(), "Kitchen", "Garage")
     furnished = furnish_rooms(house, boxes(), 1)
     notes = [n for n in furnished.notes[len(house.notes) :] if "Garage" in n.text]
@@ -115,7 +115,7 @@ def test_an_office_gets_a_desk_and_a_dining_room_a_table(use: str, has: str) -> 
 
 @pytest.mark.quick(1)
 @pytest.mark.parametrize("name", ["", "Room 3"])
-def test_a_room_whose_name_says_no_use_is_what_the_home_lacks(name: str) -> None:
+def test_a_room_with_a_neutral_name_gets_a_use_that_the_home_lacks(name: str) -> None:
     house = empty_house()
     living = next(r for r in house.rooms if r.name == "Living room")
     names = names_in(furnish_rooms(renamed(house, living.name, name), boxes(), 1), living.id)
@@ -126,13 +126,13 @@ def test_a_room_whose_name_says_no_use_is_what_the_home_lacks(name: str) -> None
 
 
 @pytest.mark.long
-def test_a_sparse_room_keeps_what_it_has_and_gets_what_it_lacks() -> None:
+def test_a_sparse_room_keeps_its_furniture_and_gets_the_missing_pieces() -> None:
     house = empty_house()
     room = next(r for r in house.rooms if r.name == "Living room")
     full = furnish_rooms(house, boxes(), 1)
-    here = [i for i in full.items if i.room_id == room.id]
-    sofas = [replace(i, nyu40=SOFA) for i in here if i.name == "sofa"]
-    # A sofa alone covers more than an empty room has, and less than a furnished one.
+    room_items = [i for i in full.items if i.room_id == room.id]
+    sofas = [replace(i, nyu40=SOFA) for i in room_items if i.name == "sofa"]
+    # A lone sofa covers more than the limit of empty rooms, and less than that of furnished ones.
     start = house.with_items([*house.items, *sofas])
     empty = furnish_rooms(start, boxes(), 2)
     assert names_in(empty, room.id) == names_in(start, room.id)
@@ -143,7 +143,7 @@ def test_a_sparse_room_keeps_what_it_has_and_gets_what_it_lacks() -> None:
 
 
 @pytest.mark.long
-def test_the_same_seed_furnishes_alike_and_another_one_otherwise() -> None:
+def test_the_same_seed_repeats_the_furniture_and_another_changes_it() -> None:
     bounds = [
         np.concatenate([i.bounds for i in furnish_rooms(empty_house(), boxes(), s).items])
         for s in (1, 1, 2)
@@ -155,10 +155,12 @@ def test_the_same_seed_furnishes_alike_and_another_one_otherwise() -> None:
 def test_furnishing_is_part_of_the_house_steps_digest() -> None:
     source = resolve(HOME.word)
     plain = recipe_from_name("fast", {"dress.catalogue": '"generated"'})
-    asked = recipe_from_name("fast", {"dress.catalogue": '"generated"', "dress.furnish": "empty"})
+    with_furnish = recipe_from_name(
+        "fast", {"dress.catalogue": '"generated"', "dress.furnish": "empty"}
+    )
     assert [row[0] for row in step_depends(source, plain)[1:]] == ["read", "repair", "surroundings"]
-    assert "furnish" in [row[0] for row in step_depends(source, asked)[1:]]
-    assert (uses_catalogue(source, plain), uses_catalogue(source, asked)) == (False, True)
+    assert "furnish" in [row[0] for row in step_depends(source, with_furnish)[1:]]
+    assert (uses_catalogue(source, plain), uses_catalogue(source, with_furnish)) == (False, True)
     assert plain.digest("dress") == recipe_from_name(
         "preview", {"dress.catalogue": '"generated"'}
     ).digest("dress")

@@ -9,7 +9,7 @@ from pbrs_farm.prepare.finished_house import repaired_house
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve, variants
 
-BARE = ",furniture=none"  # the package need not be there
+BARE = ",furniture=none"  # works without the package
 
 
 def test_the_house_of_a_seed_has_the_id_its_word_gave() -> None:
@@ -21,12 +21,12 @@ def test_the_house_of_a_seed_has_the_id_its_word_gave() -> None:
     assert "pbrs_farm" in house.source.attribution
 
 
-def test_a_home_whose_digest_begins_with_a_d_keeps_its_id_when_it_is_dressed() -> None:
+def test_a_dressed_home_whose_digest_begins_with_a_d_keeps_its_id() -> None:
     # Ids of dressed homes end in -d<seed>.
     words = (f"made:{seed}{BARE}" for seed in range(1, 200))
     source = next(s for s in map(resolve, words) if "-d" in s.house_id)
-    for one in (source, *variants(source, [3])):
-        assert read_house(one, Recipe().read).id == source.house_id
+    for entry in (source, *variants(source, [3])):
+        assert read_house(entry, Recipe().read).id == source.house_id
 
 
 @pytest.mark.long

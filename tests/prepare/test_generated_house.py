@@ -1,4 +1,4 @@
-"""A generated home as a House without a file in between: the one that its file gives."""
+"""A generated home as a House without an intermediate file equals that of its file."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ FIELDS = ReadFields()
 
 
 def both_ways(contents: HomeContents, fields: ReadFields = FIELDS) -> tuple[House, House]:
-    """Without a file, and from it; under one digest."""
+    """The house built directly, and from its file, under one digest."""
     filed = read_home(contents.archive(), "home.sh3d", fields=fields)
     direct = house_of_contents(contents, "home.sh3d", filed.source.sha256, fields)
     return direct, filed
@@ -81,12 +81,12 @@ def test_numbers_are_those_that_a_file_would_hold(dtype: type[np.floating], left
 def test_a_model_of_too_many_triangles_is_refused_as_from_a_file() -> None:
     contents = with_one_piece(random_surface(np.float32))
     fields = ReadFields(max_model_triangles=99)
-    said = []
+    messages = []
     for read in (
         lambda: read_home(contents.archive(), "home.sh3d", fields=fields),
         lambda: house_of_contents(contents, "home.sh3d", "", fields),
     ):
         with pytest.raises(Exception, match="at most 99") as refused:
             read()
-        said.append(str(refused.value))
-    assert said[0] == said[1]
+        messages.append(str(refused.value))
+    assert messages[0] == messages[1]

@@ -1,4 +1,4 @@
-"""Kitchens of which a source gives a box: runs of units of one set, what stands in them, what stands on them."""
+"""Kitchens given as boxes: runs of matching units, built-in appliances, items on top."""
 
 from __future__ import annotations
 
@@ -26,10 +26,10 @@ def generated() -> Catalogue:
     return with_families(EMPTY)
 
 
-def told(
+def boxed_item(
     name: str, at: Triple, size: Triple, source: str = "swiss-feature", number: int = 0
 ) -> Item:
-    """A thing by name and box; at: the middle of its base. size: width, height, depth."""
+    """An item with a name and a box; at: the middle of its base. size: width, height, depth."""
     x, y, z = at
     item = box_only_item(f"box_{number}", source, name, (x, y + size[1] / 2, z), size, 0.0)
     assert item is not None
@@ -54,11 +54,11 @@ def sets(items: list[Item]) -> set[str]:
     return {next(SET[t] for t in i.tags if t in SET) for i in items}
 
 
-def test_a_kitchen_is_units_side_by_side_with_one_worktop() -> None:
-    items = stand_ins(furnished(told("KITCHEN", (2.0, 0, 0.32), (3.0, 0.9, 0.6))))
+def test_a_kitchen_is_a_row_of_units_with_one_worktop() -> None:
+    items = stand_ins(furnished(boxed_item("KITCHEN", (2.0, 0, 0.32), (3.0, 0.9, 0.6))))
     assert sorted(groups(items)) == ["base_cabinet"] * 3 + ["cooker", "sink"]
     assert len(sets(items)) == 1
-    # They fill the box from end to end, their backs at the wall behind.
+    # They fill the box from end to end with their backs at the wall.
     spans = sorted((float(i.bounds[0, 0]), float(i.bounds[1, 0])) for i in items)
     assert (spans[0][0], spans[-1][1]) == pytest.approx((0.5, 3.5), abs=0.02)
     for (_, high), (low, _) in pairwise(spans):
@@ -68,9 +68,9 @@ def test_a_kitchen_is_units_side_by_side_with_one_worktop() -> None:
     assert all(i.box is not None and i.box.axes[2, 2] > 0.99 for i in items)
 
 
-def test_a_sink_that_lies_in_a_kitchen_is_its_unit() -> None:
-    kitchen = told("KITCHEN", (2.0, 0, 0.32), (3.0, 0.9, 0.6))
-    sink = told("SINK", (1.2, 0, 0.3), (0.5, 0.85, 0.45), number=1)
+def test_a_sink_inside_a_kitchen_box_becomes_its_unit() -> None:
+    kitchen = boxed_item("KITCHEN", (2.0, 0, 0.32), (3.0, 0.9, 0.6))
+    sink = boxed_item("SINK", (1.2, 0, 0.3), (0.5, 0.85, 0.45), number=1)
     house = furnished(kitchen, sink)
     (unit,) = stand_ins(house, "box_1")
     assert groups([unit]) == ["sink"]
@@ -85,26 +85,26 @@ def test_a_sink_that_lies_in_a_kitchen_is_its_unit() -> None:
 
 
 def test_a_machine_in_a_counter_keeps_its_place() -> None:
-    counter = told("CounterTop", (2.0, 0, 0.32), (3.0, 0.9, 0.6), "ai2thor")
-    washer = told("washing machine", (2.9, 0, 0.32), (0.6, 0.85, 0.6), "roomplan", 1)
+    counter = boxed_item("CounterTop", (2.0, 0, 0.32), (3.0, 0.9, 0.6), "ai2thor")
+    washer = boxed_item("washing machine", (2.9, 0, 0.32), (0.6, 0.85, 0.6), "roomplan", 1)
     house = furnished(counter, washer)
     assert groups(stand_ins(house, "box_1")) == ["washer"]
     for unit in stand_ins(house, "box_0"):
         assert unit.bounds[1, 0] < 2.62 or unit.bounds[0, 0] > 3.18
-    # A counter is no whole kitchen: nothing is added to it.
+    # A counter is not a whole kitchen: no units are added to it.
     assert set(groups(stand_ins(house, "box_0"))) == {"base_cabinet"}
 
 
-def test_a_counter_full_of_machines_is_nothing_beside_them() -> None:
-    counter = told("storage", (1.4, 0, 0.32), (2.0, 0.92, 0.62), "roomplan")
+def test_a_counter_full_of_appliances_gets_no_other_units() -> None:
+    counter = boxed_item("storage", (1.4, 0, 0.32), (2.0, 0.92, 0.62), "roomplan")
     inside = [
-        told("dishwasher", (0.7, 0.03, 0.32), (0.6, 0.82, 0.6), "roomplan", 1),
-        told("sink", (1.4, 0.78, 0.32), (0.55, 0.16, 0.45), "roomplan", 2),
-        told("stove", (2.1, 0.88, 0.32), (0.58, 0.06, 0.5), "roomplan", 3),
-        told("oven", (2.1, 0.1, 0.32), (0.58, 0.6, 0.55), "roomplan", 4),
+        boxed_item("dishwasher", (0.7, 0.03, 0.32), (0.6, 0.82, 0.6), "roomplan", 1),
+        boxed_item("sink", (1.4, 0.78, 0.32), (0.55, 0.16, 0.45), "roomplan", 2),
+        boxed_item("stove", (2.1, 0.88, 0.32), (0.58, 0.06, 0.5), "roomplan", 3),
+        boxed_item("oven", (2.1, 0.1, 0.32), (0.58, 0.6, 0.55), "roomplan", 4),
     ]
     items = stand_ins(furnished(counter, *inside))
-    # The cooker has its oven in it.
+    # The cooker includes its oven.
     assert {i.id: g for i, g in zip(items, groups(items), strict=True)} == {
         "box_1": "dishwasher", "box_2": "sink", "box_3": "cooker",
     }  # fmt: skip
@@ -114,7 +114,9 @@ def test_a_counter_full_of_machines_is_nothing_beside_them() -> None:
 
 
 def test_a_deep_counter_in_a_corner_is_an_l() -> None:
-    items = stand_ins(furnished(told("CounterTop", (1.3, 0, 0.9), (2.6, 0.95, 1.8), "ai2thor")))
+    items = stand_ins(
+        furnished(boxed_item("CounterTop", (1.3, 0, 0.9), (2.6, 0.95, 1.8), "ai2thor"))
+    )
     assert set(groups(items)) == {"base_cabinet"}
     along_north = [i for i in items if i.bounds[1, 2] < 0.7]
     along_west = [i for i in items if i.bounds[1, 0] < 0.7 and i.bounds[0, 2] > 0.5]
@@ -123,9 +125,9 @@ def test_a_deep_counter_in_a_corner_is_an_l() -> None:
     assert len(along_west) >= 1
 
 
-def test_storage_of_a_scan_is_a_kitchens_in_a_kitchen_alone() -> None:
-    low = told("storage", (2.0, 0, 0.32), (2.4, 0.92, 0.62), "roomplan")
-    high = told("storage", (2.0, 1.45, 0.2), (2.4, 0.7, 0.35), "roomplan", 1)
+def test_storage_of_a_scan_is_kitchen_units_only_in_a_kitchen() -> None:
+    low = boxed_item("storage", (2.0, 0, 0.32), (2.4, 0.92, 0.62), "roomplan")
+    high = boxed_item("storage", (2.0, 1.45, 0.2), (2.4, 0.7, 0.35), "roomplan", 1)
     kitchen = furnished(low, high)
     assert set(groups(stand_ins(kitchen, "box_0"))) == {"base_cabinet"}
     uppers = stand_ins(kitchen, "box_1")
@@ -136,12 +138,10 @@ def test_storage_of_a_scan_is_a_kitchens_in_a_kitchen_alone() -> None:
 
 
 @pytest.mark.parametrize(("room", "group"), [("Kitchen", "sink"), ("Bathroom", "washbasin")])
-def test_a_basin_is_what_its_room_has_and_its_rim_is_where_it_is_told(
-    room: str, group: str
-) -> None:
-    # A scan measures the bowl alone.
+def test_a_basin_fits_its_room_and_keeps_its_rim_height(room: str, group: str) -> None:
+    # A scan measures only the bowl.
     (basin,) = stand_ins(
-        furnished(told("sink", (2.0, 0.65, 0.3), (0.5, 0.2, 0.45), "roomplan"), room=room)
+        furnished(boxed_item("sink", (2.0, 0.65, 0.3), (0.5, 0.2, 0.45), "roomplan"), room=room)
     )
     assert groups([basin]) == [group]
     assert basin.bounds[0, 1] == pytest.approx(0.0, abs=0.01)
@@ -149,9 +149,9 @@ def test_a_basin_is_what_its_room_has_and_its_rim_is_where_it_is_told(
 
 
 @pytest.mark.parametrize("size", [(0.45, 0.42, 0.7), (0.5, 0.4, 0.5), (0.35, 1.1, 0.9)])
-def test_a_toilet_is_a_toilet_whatever_its_box_is(size: Triple) -> None:
+def test_a_toilet_with_any_box_is_a_toilet(size: Triple) -> None:
     house = furnished(
-        told("toilet", (2.0, 0, size[2] / 2 + 0.02), size, "roomplan"), room="Bathroom"
+        boxed_item("toilet", (2.0, 0, size[2] / 2 + 0.02), size, "roomplan"), room="Bathroom"
     )
     (toilet,) = stand_ins(house)
     assert groups([toilet]) == ["toilet"]

@@ -1,4 +1,4 @@
-"""The table of passes: what it says of order, groups and versions is what is done."""
+"""The table of passes: order, groups and versions take effect."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.run import plan
 from workers.job import work_version
 
-# Runs passes.py with one function and one row more, before anything else imports it.
+# Runs passes.py with one more function and row, before it is imported.
 ADDED = '''
 import sys
 from pathlib import Path
@@ -60,7 +60,7 @@ print(work_version())
 
 
 @pytest.mark.kinds("pass")
-def test_a_pass_that_is_added_in_one_file_is_done_and_is_part_of_digests() -> None:
+def test_a_pass_added_in_one_file_runs_and_is_part_of_digests() -> None:
     words = [sys.executable, "-c", ADDED, str(passes_module.__file__)]
     done = subprocess.run(words, capture_output=True, text=True, cwd=Path(__file__).parents[2])
     assert done.returncode == 0, done.stderr
@@ -76,8 +76,8 @@ def test_a_home_goes_through_the_passes_that_it_needs() -> None:
     assert names_of(source, recipe) == ["read", "repair"]
     edited = variants(source, [3])[0].edited(RemoveItems(items=("sofa",)))
     full = with_settings(recipe, {"dress.furnish": "empty", "surroundings.kind": "drawn"})
-    every = ["read", "furnish", "dress", "repair", "surroundings", "edits"]
-    assert names_of(edited, full) == every
+    all_passes = ["read", "furnish", "dress", "repair", "surroundings", "edits"]
+    assert names_of(edited, full) == all_passes
     hung = with_settings(recipe, {"dress.float_share": 0.1})
     assert names_of(source, hung) == ["read", "repair", "float"]
     plan_of_others = source.model_copy(update={"kind": "plan"})
@@ -95,17 +95,17 @@ def test_an_object_and_a_home_of_a_plugin_are_only_read(kind: str) -> None:
 
 def test_the_key_of_a_cache_differs_with_every_field_that_a_pass_reads() -> None:
     source, recipe = resolve("builtin"), Recipe()
-    held = cache_key(source, recipe)
-    assert cache_key(source, with_settings(recipe, {"light.spp": 7})) == held
+    first_key = cache_key(source, recipe)
+    assert cache_key(source, with_settings(recipe, {"light.spp": 7})) == first_key
     changes = {"read.strict": True, "dress.mess": 0.9, "repair.add_ceilings": True}
     changes |= {"surroundings.kind": "drawn"}
     assert {path.partition(".")[0] for path in changes} == set(GROUPS)
     assert set(changes) <= set(field_paths())
     for path, value in changes.items():
-        assert cache_key(source, with_settings(recipe, {path: value})) != held, path
+        assert cache_key(source, with_settings(recipe, {path: value})) != first_key, path
 
 
-def test_the_share_of_one_s_own_library_counts_where_there_is_one(
+def test_the_share_of_the_users_library_counts_only_if_there_is_one(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     (source,) = variants(resolve("builtin"), [1])
@@ -116,9 +116,7 @@ def test_the_share_of_one_s_own_library_counts_where_there_is_one(
         assert len({str(step_depends(source, recipe)) for recipe in recipes}) == n_digests
 
 
-def test_the_version_of_what_reads_plans_is_one_of_plans_alone(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_the_version_of_plan_readers_affects_only_plans(monkeypatch: pytest.MonkeyPatch) -> None:
     built_in, recipe = resolve("builtin"), Recipe()
     sources = (built_in, built_in.model_copy(update={"kind": "plan"}))
     before = [step_depends(source, recipe) for source in sources]
@@ -129,43 +127,41 @@ def test_the_version_of_what_reads_plans_is_one_of_plans_alone(
     ]
 
 
-def test_every_group_of_a_pass_is_one_that_pictures_depend_on() -> None:
+def test_every_group_of_a_pass_affects_pictures() -> None:
     assert set(GROUPS) <= set(picture_groups())
     assert set(plan.STEPS["house"].groups) <= set(GROUPS)
 
 
 def test_workers_of_other_passes_are_of_another_version(monkeypatch: pytest.MonkeyPatch) -> None:
-    held = work_version.__wrapped__()
-    assert work_version.__wrapped__() == held
+    version = work_version.__wrapped__()
+    assert work_version.__wrapped__() == version
     versions = passes_module.versions_of_passes()
     assert set(versions) == {*PASS, "plans"}
     for name in versions:
         raised = versions | {name: versions[name] + 1}
         monkeypatch.setattr("pbrs_farm.prepare.passes.versions_of_passes", lambda r=raised: r)
-        assert work_version.__wrapped__() != held, name
+        assert work_version.__wrapped__() != version, name
 
 
-def test_homes_that_differ_in_edits_alone_are_prepared_once(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_homes_that_differ_only_in_edits_are_prepared_once(monkeypatch: pytest.MonkeyPatch) -> None:
     begun: list[str] = []
     monkeypatch.setattr(finishing, "note_step", lambda _file, step: begun.append(step))
-    source, recipe, kept = resolve("builtin"), Recipe(), HouseBeforeEdits()
+    source, recipe, cache = resolve("builtin"), Recipe(), HouseBeforeEdits()
     house = finished_house(source, recipe).house
     removed = [item.id for item in house.items][:2]
     edited = [source.edited(RemoveItems(items=(item,))) for item in removed]
     begun.clear()
-    for one in edited:
-        made = finished_house(one, recipe, before_edits=kept).house
-        assert made.id == one.house_id
-        assert sum(item.is_removed for item in made.items) == 1
+    for home in edited:
+        finished = finished_house(home, recipe, before_edits=cache).house
+        assert finished.id == home.house_id
+        assert sum(item.is_removed for item in finished.items) == 1
     assert begun == ["read", "repair", "edits", "edits"]
-    kept.clear()
-    assert kept.get(source, recipe) is None
+    cache.clear()
+    assert cache.get(source, recipe) is None
 
 
 @pytest.mark.parametrize("name", [p.name for p in PASSES])
-def test_another_version_of_a_pass_makes_anew_the_houses_that_go_through_it(
+def test_another_version_of_a_pass_renews_the_houses_that_use_it(
     name: str, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     changed = {
@@ -184,7 +180,7 @@ def test_another_version_of_a_pass_makes_anew_the_houses_that_go_through_it(
     monkeypatch.setattr("pbrs_farm.prepare.passes.PASSES", tuple(raised))
     assert step_depends(source, full) != before
     assert (step_depends(bare, Recipe()) != before_bare) == (name in ("read", "repair"))
-    # A home of a plugin may go through any.
+    # A plugin's home may use any pass.
     of_plugin = bare.model_copy(update={"kind": "plugin"})
     monkeypatch.undo()
     of_before = step_depends(of_plugin, Recipe())

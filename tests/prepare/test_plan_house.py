@@ -1,4 +1,4 @@
-"""A file of a floor plan is a house: closed, with its doors, its things furnished where they are told."""
+"""A floor plan file becomes a closed house with its doors and furniture in place."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ from tests.inputs.box_catalogue import boxes
 from tests.inputs.plan_files import HOLES, ROOMS, TELLING, WRITERS, write_swiss, write_zind
 from workers.house_files import entries_from_arguments, upload
 
-# The others give the same walls (tests/generate/test_plan_files.py).
+# The other formats give the same walls (tests/generate/test_plan_files.py).
 formats = pytest.mark.parametrize("name", ["swiss", "procthor", "roomplan", "cubicasa"])
 
 
@@ -42,7 +42,7 @@ def test_the_house_of_a_plan_is_closed_in_every_format(tmp_path: Path, name: str
 
 
 @pytest.mark.parametrize("name", TELLING)
-def test_what_a_plan_tells_stands_in_its_room(tmp_path: Path, name: str) -> None:
+def test_furniture_of_a_plan_is_in_its_room(tmp_path: Path, name: str) -> None:
     house = read_house(resolve(str(WRITERS[name](tmp_path))), ReadFields())
     stood = with_stand_ins(house, boxes(), "pieces")
     things = [i for i in stood.items if STAND_IN in i.tags]
@@ -62,7 +62,7 @@ def test_storeys_lie_upon_each_other(tmp_path: Path) -> None:
     np.testing.assert_allclose(rises, 2.6 + 0.26)
 
 
-def test_a_part_of_a_file_is_a_house_of_its_own(tmp_path: Path) -> None:
+def test_a_part_of_a_file_is_a_separate_house(tmp_path: Path) -> None:
     path = write_zind(tmp_path, n_floors=2)
     whole, upper = resolve(str(path)), resolve(f"{path}#floor=1")
     assert upper.house_id != whole.house_id
@@ -76,13 +76,13 @@ def test_a_part_of_a_file_is_a_house_of_its_own(tmp_path: Path) -> None:
         read_house(resolve(f"{path.parent / 'geometries.csv'}#apartment=zz"), ReadFields())
 
 
-def test_a_file_whose_name_has_a_hash_is_itself(tmp_path: Path) -> None:
+def test_a_file_with_a_hash_in_its_name_is_found(tmp_path: Path) -> None:
     path = tmp_path / "plan#floor=1.json"
     path.write_bytes(WRITERS["own"](tmp_path).read_bytes())
     assert resolve(str(path)).part == ""
 
 
-def test_a_plan_that_changed_since_it_was_named_is_told(tmp_path: Path) -> None:
+def test_a_plan_changed_since_it_was_named_is_reported(tmp_path: Path) -> None:
     path = WRITERS["procthor"](tmp_path)
     source = resolve(str(path))
     (tmp_path / "asset-database.json").write_text("{}")
@@ -112,13 +112,15 @@ def test_a_plan_travels_to_a_farm(tmp_path: Path, name: str) -> None:
     assert home_id(placed) == home_id(ref)
 
 
-def test_a_house_with_its_table_of_sizes_beside_stays_in_place(tmp_path: Path) -> None:
+def test_a_house_beside_its_table_of_sizes_is_not_copied(tmp_path: Path) -> None:
     path = WRITERS["procthor"](tmp_path)
     ((entry, _ref),) = entries_from_arguments([str(path)])
     assert SourceRef.model_validate_json(entry.source).location == str(path)
 
 
-def test_a_plan_as_a_homes_file_has_what_is_told_and_furniture_elsewhere(tmp_path: Path) -> None:
+def test_a_plan_saved_as_a_home_has_its_listed_items_and_generated_furniture(
+    tmp_path: Path,
+) -> None:
     file = plan_from_file(WRITERS["cubicasa"](tmp_path))
     (storey,) = furnish_plan_file(file, boxes(), seed=1).storeys
     by_room = {r.type.value: {p.piece.group for p in storey.pieces if p.room == k}

@@ -1,4 +1,4 @@
-"""Rooms without a name are typed by what stands in them, whatever format they come from."""
+"""Unnamed rooms are typed by their furniture, in every format."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def types_as_read(path: Path) -> list[tuple[str, ...]]:
 
 
 @pytest.mark.parametrize(("name", "types"), [("Bed", ("bedroom",)), ("Vase", ())])
-def test_a_room_between_walls_goes_by_what_stands_in_it(
+def test_a_room_between_walls_is_typed_by_its_furniture(
     tmp_path: Path, name: str, types: tuple[str, ...]
 ) -> None:
     path = tmp_path / "home.sh3d"
@@ -32,14 +32,14 @@ def test_a_room_between_walls_goes_by_what_stands_in_it(
     assert types_as_read(path) == [types]
 
 
-def test_a_name_stays_before_what_stands_in_the_room(tmp_path: Path) -> None:
+def test_a_name_precedes_the_furniture_of_a_room(tmp_path: Path) -> None:
     path = tmp_path / "home.sh3d"
     bed = piece("name='Bed'")
     path.write_bytes(sh3d(home_xml(WALLS + bed), {"1": BOX_OBJ}))
     assert types_as_read(path) == [("Hall",)]
 
 
-def test_rooms_of_a_scene_go_by_what_stands_in_them(tmp_path: Path) -> None:
+def test_rooms_of_a_scene_are_typed_by_their_furniture(tmp_path: Path) -> None:
     scene = two_rooms()
     scene.node("Bed", mesh=scene.box([0.5, 0.0, 0.5], [2.0, 0.5, 2.5]))
     scene.node("Toilet", mesh=scene.box([5.0, 0.0, 0.2], [5.4, 0.8, 0.9]))

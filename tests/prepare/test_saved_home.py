@@ -1,4 +1,4 @@
-"""Homes with edits as files: read where a home is named, and told of where they are not what they were."""
+"""Homes with edits as files: accepted wherever a home is named, and reported if changed since."""
 
 from __future__ import annotations
 
@@ -49,12 +49,12 @@ def test_a_home_without_edits_is_saved_too(tmp_path: Path) -> None:
 def test_a_folder_of_saved_homes_is_all_of_them(tmp_path: Path) -> None:
     for name in ("b", "a"):
         small_home().save(tmp_path / f"{name}.home.json")
-    found = words_of_homes([str(tmp_path)])
-    assert [Path(word).name for word in found] == ["a.home.json", "b.home.json"]
+    words = words_of_homes([str(tmp_path)])
+    assert [Path(word).name for word in words] == ["a.home.json", "b.home.json"]
 
 
 @pytest.mark.long
-def test_a_walk_through_it_from_the_command_line_shows_what_moves(
+def test_a_walk_from_the_command_line_shows_moving_items(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = small_home().open("door_*", at={0: 0, 1: 1}).save(tmp_path / "doors.home.json")
@@ -70,8 +70,8 @@ def test_a_walk_through_it_from_the_command_line_shows_what_moves(
     capsys.readouterr()
 
 
-def test_what_is_wrong_with_the_file_is_one_line(saved: Path, tmp_path: Path) -> None:
-    held = json.loads(saved.read_text())
+def test_faults_of_the_file_are_one_line(saved: Path, tmp_path: Path) -> None:
+    document = json.loads(saved.read_text())
     for change, text in (
         ({"house_id": "builtin-0"}, "has changed since"),
         ({"format": "pbrs_farm home 9"}, "format"),
@@ -79,7 +79,7 @@ def test_what_is_wrong_with_the_file_is_one_line(saved: Path, tmp_path: Path) ->
         ({"home": str(saved)}, "refers to another file"),
     ):
         file = tmp_path / "bad.home.json"
-        file.write_text(json.dumps(held | change))
+        file.write_text(json.dumps(document | change))
         with pytest.raises(BadHouse, match=text) as caught:
             resolve(str(file))
         assert "\n" not in str(caught.value)

@@ -1,4 +1,4 @@
-"""Things given by class and box alone: the piece that fits best, off the walls, its front to the room."""
+"""Items given only by class and box: the best fitting piece, off the walls, its front to the room."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ BED, CHAIR, TABLE = 4, 5, 7
 
 
 def shape_of(piece: Piece) -> Shape:
-    """A box of the piece's size; a lower one in front, so that its front can be seen."""
+    """A box of the piece's size with a lower one in front, which marks the front."""
     w, d, h = piece.size
     quads = box_quads(np.array([0.0, h / 2, -d / 4]), np.array([w, h, d / 2]) / 2)
     low = box_quads(np.array([0.0, h / 4, d / 4]), np.array([w, h / 2, d / 2]) / 2)
@@ -28,11 +28,11 @@ def shape_of(piece: Piece) -> Shape:
 
 
 def catalogue(*pieces: tuple[str, tuple[float, float, float], int]) -> Catalogue:
-    made = tuple(
+    catalogue_pieces = tuple(
         Piece(f"t#{group}{k}", group, group, Place.FLOOR, nyu40, size, creator="Ada", licence="CC-BY 3.0")
         for k, (group, size, nyu40) in enumerate(pieces)
     )  # fmt: skip
-    return Catalogue(made, shape_of, "test")
+    return Catalogue(catalogue_pieces, shape_of, "test")
 
 
 PIECES = catalogue(
@@ -68,7 +68,7 @@ def of(house: House, number: int = 0) -> Item:
     return item
 
 
-def test_the_piece_whose_proportions_fit_best_stands_scaled_in_the_given_box() -> None:
+def test_the_piece_with_the_best_proportions_is_scaled_to_the_box() -> None:
     item = of(furnished(box_only("bed", (1.0, 0.4, 2.5), (0.9, 0.8, 2.2))))
     assert f"piece:{PIECES.pieces[1].id}" in item.tags
     assert STAND_IN in item.tags
@@ -128,8 +128,8 @@ def test_chairs_look_at_the_nearest_table(way: tuple[float, float]) -> None:
 
 
 @pytest.mark.parametrize(("z", "top"), [(1.8, 0.75), (2.2, 0.375)])
-def test_what_stands_on_a_thing_stands_on_its_stand_in(z: float, top: float) -> None:
-    """The front half of a stand-in here is half as high as its box."""
+def test_contents_of_an_item_are_moved_onto_its_stand_in(z: float, top: float) -> None:
+    """The front half of a stand-in is half as high as its box."""
     table = box_only(
         "dining_table", (2.5, 0.375, 2.0), (1.4, 0.75, 0.8), number=1, is_front_given=True
     )
@@ -137,14 +137,14 @@ def test_what_stands_on_a_thing_stands_on_its_stand_in(z: float, top: float) -> 
     assert of(furnished(mug, table)).bounds[0, 1] == pytest.approx(top, abs=1e-3)
 
 
-def test_what_stands_on_a_plain_box_stays_on_it() -> None:
+def test_contents_of_a_plain_box_stay_on_it() -> None:
     plain = box_only("bed", (2.5, 0.375, 2.0), (4.0, 0.75, 0.5), number=1)
     seat = box_only("chair", (2.5, 0.3, 2.0), (0.45, 0.6, 0.5), number=2)
     cup = box_only("cup", (2.5, 0.85, 2.0), (0.09, 0.1, 0.09))
     assert of(furnished(seat, plain, cup)).bounds[0, 1] == pytest.approx(0.75, abs=5e-3)
 
 
-def test_what_hangs_where_nothing_is_below_stays_where_it_is() -> None:
+def test_a_hung_item_with_nothing_below_stays_in_place() -> None:
     table = box_only("dining_table", (2.5, 0.375, 2.0), (1.4, 0.75, 0.8), number=1)
     picture = box_only("painting", (2.5, 1.5, 0.03), (0.6, 0.4, 0.03))
     assert of(furnished(picture, table)).bounds[0, 1] == pytest.approx(1.3, abs=0.01)
@@ -152,7 +152,7 @@ def test_what_hangs_where_nothing_is_below_stays_where_it_is() -> None:
 
 @pytest.mark.parametrize("size", [(1.0, 0.6, 0.06), (0.06, 0.6, 1.0)])
 def test_a_flat_screen_looks_across_its_thin_side(size: tuple[float, float, float]) -> None:
-    # Its sides fit a screen that is modelled .62 m wide better than its front does.
+    # Sideways the modelled screen of .62 m fits better than frontally.
     screens = catalogue(("tv", (0.62, 0.18, 0.6), 25), ("tv", (0.95, 0.1, 0.6), 25))
     item = of(furnished(box_only("television", (2.5, 1.3, 2.0), size), shelf=screens))
     width, _height, depth = np.ptp(item.bounds, axis=0)
@@ -173,13 +173,13 @@ def test_a_box_that_reaches_into_a_wall_moves_inwards_by_the_overlap() -> None:
     assert -0.011 <= item.bounds[0, 0] - 0.01 <= 0.06
 
 
-def test_a_box_that_lies_mostly_in_a_wall_is_left_out_with_a_note() -> None:
+def test_a_box_mostly_inside_a_wall_is_dropped_with_a_note() -> None:
     house = furnished(box_only("bed", (-0.1, 0.4, 2.0), (0.95, 0.8, 2.05)))
     assert not any(STAND_IN in i.tags for i in house.items)
     assert [n.text for n in house.notes] == ["1 items reach into walls and are left out: 1 bed"]
 
 
-def test_what_no_piece_fits_is_a_plain_box_of_its_size_with_a_note() -> None:
+def test_a_box_without_a_fitting_piece_stays_a_plain_box_with_a_note() -> None:
     house = furnished(box_only("bed", (2.5, 0.15, 2.0), (4.0, 0.3, 0.5)))
     item = of(house)
     assert "piece:box" in item.tags
@@ -187,7 +187,7 @@ def test_what_no_piece_fits_is_a_plain_box_of_its_size_with_a_note() -> None:
     assert [n.kind for n in house.notes] == ["stand-in-box"]
 
 
-def test_what_begins_below_the_floor_or_a_little_above_stands_on_it() -> None:
+def test_a_box_slightly_off_the_floor_is_put_on_it() -> None:
     for y in (0.2, 0.6):
         assert of(furnished(box_only("bed", (2.5, y, 2.0), (1.6, 0.8, 2.1)))).bounds[
             0, 1
@@ -207,20 +207,20 @@ def test_the_recipe_may_ask_for_boxes_or_for_nothing(how: str, expected: int) ->
     assert [n.kind for n in house.notes] == ["box-only-left-out"] * (how == "none")
 
 
-def test_whoever_made_the_piece_is_credited() -> None:
+def test_the_author_of_a_piece_is_credited() -> None:
     assert (
         "Ada, CC-BY 3.0"
         in furnished(box_only("bed", (2.5, 0.4, 2), (1.6, 0.8, 2.1))).source.attribution
     )
 
 
-def test_a_thing_stands_in_the_room_that_holds_it_not_in_the_one_it_is_near() -> None:
+def test_an_item_belongs_to_the_room_that_contains_it_rather_than_the_nearest() -> None:
     house = empty_room()
     (room,) = house.rooms
     beside = replace(room, id="0_0", polygon=room.polygon - np.array([5.02, 0], np.float32))
     item = box_only("chair", (0.3, 0.45, 2.0), (0.45, 0.9, 0.5))
-    both = replace(house, rooms=(beside, replace(room, id="0_1")), items=(*house.items, item))
-    assert of(with_stand_ins(both, PIECES, "pieces")).room_id == "0_1"
+    two_rooms = replace(house, rooms=(beside, replace(room, id="0_1")), items=(*house.items, item))
+    assert of(with_stand_ins(two_rooms, PIECES, "pieces")).room_id == "0_1"
 
 
 @pytest.mark.parametrize(
@@ -228,7 +228,7 @@ def test_a_thing_stands_in_the_room_that_holds_it_not_in_the_one_it_is_near() ->
     [((math.nan, 0, 0), (1, 1, 1)), ((0, 0, 0), (1, math.inf, 1)), ((0, 0, 0), (0, 1, 1)),
      ((0, 0, 0), (1e30, 1, 1)), ((0, 0, 0), (-1, 1, 1))],
 )  # fmt: skip
-def test_a_box_that_is_none_is_no_item(
+def test_a_degenerate_box_is_no_item(
     at: tuple[float, float, float], size: tuple[float, float, float]
 ) -> None:
     assert box_only_item("x", "spatiallm", "bed", at, size, 0.0) is None

@@ -1,4 +1,4 @@
-"""A context comes through EGL, else through what the system has; without one it is said clearly."""
+"""An OpenGL context comes through EGL, else through the system's library; failing both, the error is clear."""
 
 from __future__ import annotations
 
@@ -13,38 +13,38 @@ from pbrs_farm.installation import system_command
 from pbrs_farm.raster.gl_device import open_context
 
 
-def test_where_egl_fails_the_systems_own_way_is_taken(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[str] = []
-    found = SimpleNamespace(enable=lambda _flag: None)
+def test_without_egl_the_systems_library_is_used(monkeypatch: pytest.MonkeyPatch) -> None:
+    calls: list[str] = []
+    context = SimpleNamespace(enable=lambda _flag: None)
 
     def create(**settings: Any) -> Any:
-        asked.append(settings.get("backend", "default"))
-        if asked[-1] == "egl":
+        calls.append(settings.get("backend", "default"))
+        if calls[-1] == "egl":
             raise Exception("eglInitialize failed")
-        return found
+        return context
 
     monkeypatch.setattr(moderngl, "create_context", create)
-    assert open_context() is found
-    assert asked == ["egl", "egl", "default"]
+    assert open_context() is context
+    assert calls == ["egl", "egl", "default"]
 
 
 def test_egl_by_its_usual_name_needs_no_search(monkeypatch: pytest.MonkeyPatch) -> None:
-    asked: list[dict[str, Any]] = []
-    found = SimpleNamespace(enable=lambda _flag: None)
+    calls: list[dict[str, Any]] = []
+    context = SimpleNamespace(enable=lambda _flag: None)
 
     def create(**settings: Any) -> Any:
-        asked.append(settings)
-        if len(asked) == 1:
+        calls.append(settings)
+        if len(calls) == 1:
             raise Exception("libEGL.so.1 not loaded")
-        return found
+        return context
 
     monkeypatch.setattr(moderngl, "create_context", create)
-    assert open_context() is found
-    assert (asked[0]["libgl"], asked[0]["libegl"]) == ("libGL.so.1", "libEGL.so.1")
-    assert "libegl" not in asked[1]
+    assert open_context() is context
+    assert (calls[0]["libgl"], calls[0]["libegl"]) == ("libGL.so.1", "libEGL.so.1")
+    assert "libegl" not in calls[1]
 
 
-def test_without_any_the_reason_of_each_and_the_remedy_are_told(
+def test_without_any_library_the_error_has_each_reason_and_the_remedy(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def create(**settings: Any) -> Any:
@@ -53,7 +53,7 @@ def test_without_any_the_reason_of_each_and_the_remedy_are_told(
     monkeypatch.setattr(moderngl, "create_context", create)
     with pytest.raises(MachineFailed) as caught:
         open_context()
-    told = str(caught.value)
-    assert "EGL: no library; the system's own: cannot open display" in told
-    assert system_command("gl") in told
-    assert "\n" not in told
+    text = str(caught.value)
+    assert "EGL: no library; the system's own: cannot open display" in text
+    assert system_command("gl") in text
+    assert "\n" not in text

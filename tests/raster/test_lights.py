@@ -29,7 +29,7 @@ def test_the_strongest_lights_at_the_box_are_kept_not_the_weakest():
     assert best_lights(lights, low, high, 3).tolist() == [[1, 2, 0]]
 
 
-def test_fewer_lights_than_asked_for_are_all_kept():
+def test_fewer_lights_than_requested_are_all_kept():
     assert best_lights(table(lamp(1.0)), np.zeros((2, 3)), np.ones((2, 3)), 8).shape == (2, 1)
 
 
@@ -49,7 +49,7 @@ def test_a_spot_lights_only_inside_its_cone():
     assert lx[1] == 0
 
 
-def test_doubling_every_lamp_leaves_the_brightness_as_it_is():
+def test_doubling_every_lamp_leaves_the_brightness_unchanged():
     floor = Surface(
         "floor",
         np.array([[-2, 0, -2], [2, 0, -2], [2, 0, 2], [-2, 0, 2]], np.float32),
@@ -63,5 +63,5 @@ def test_doubling_every_lamp_leaves_the_brightness_as_it_is():
         )
         scales.append(brightness_scale(scene, 8) * lumen)
     assert scales[0] == pytest.approx(scales[1])
-    # The lamp stands 2 m above the middle: the median lies below the brightest point.
+    # The lamp is 2 m above the middle: the median is below the brightest point.
     assert brightness_scale(scene, 8) > FLOOR_LEVEL / (1600 / (4 * np.pi) / (4 + SOFTENING_M**2))

@@ -131,7 +131,7 @@ def test_glass_has_holes_too():
         assert np.array_equal(glazed.render_dl(camera()), without)
 
 
-def test_what_is_cut_out_as_a_whole_needs_no_picture():
+def test_a_fully_cut_out_surface_needs_no_picture():
     gone = Material("gone", alpha_cutout=True, alpha_cutoff=NOTHING_LEFT)
     scene = house((item(square(-2.0, 0)), item(square(-3.0, 1))), (gone, RED))
     with Rasterizer(scene, {}) as raster:
@@ -170,7 +170,7 @@ def test_edges_are_averages_of_four_samples_in_linear_light():
     assert 2 < len(levels) <= 5
 
 
-def test_a_lamp_lights_what_is_near_it_most():
+def test_a_lamp_lights_near_surfaces_most():
     bulb = LightPart((-0.8, 0.0, -1.6), 0.03, 0.5, PowerUnit.SWEETHOME3D)
     scene = house((item(square(-2.0, 0, half=2.0), lights=(bulb,)),), (WHITE,))
     with Rasterizer(scene, {}) as raster:
@@ -202,7 +202,7 @@ def test_two_rasterizers_live_side_by_side():
     assert blue[12, 16, 2] > 100 > blue[12, 16, 0]
 
 
-def test_a_machine_without_egl_is_told_what_to_install(monkeypatch):
+def test_without_egl_the_error_names_the_package_to_install(monkeypatch):
     def refuse(**_: object) -> None:
         raise Exception("(detect) libEGL.so: cannot open shared object file")
 
@@ -223,7 +223,7 @@ def test_triangles_that_are_not_finite_or_without_area_are_drawn_as_if_not_there
     assert (pictures[0] == pictures[1]).all()
 
 
-def test_shading_normals_that_are_nan_or_zero_are_replaced_by_the_faces_own():
+def test_shading_normals_that_are_nan_or_zero_become_face_normals():
     good = square(-2.0, 0)
     normals = np.array([[0, 0, 1], [np.nan, 0, 0], [0, 0, 0], [0, 0, 1]], np.float32)
     bad = Surface("bad", good.positions, good.faces, 0, normals=normals)
@@ -268,6 +268,6 @@ def test_a_line_of_light_is_as_bright_as_many_points_along_it():
         scene = house((item(square(-2.0, 0, half=2.0), lights=lights),), (WHITE,))
         with Rasterizer(scene, {}, RasterFields(lights_per_object=64)) as raster:
             pictures.append(raster.render_il(camera())[..., 0].astype(float))
-    # Each is scaled to its own house's median: compare shapes where both are well lit.
+    # Each is scaled to the median of its house: compare shapes where both are well lit.
     ratio = pictures[0][6:18, 4:28] / pictures[1][6:18, 4:28]
     assert np.abs(ratio / np.median(ratio) - 1).max() < 0.12

@@ -1,4 +1,4 @@
-"""What the shaders get of a material."""
+"""Uniforms that the shaders get for a material."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def test_a_metal_without_a_picture_has_the_colour_of_its_highlights() -> None:
     gold = Material("gold", diffuse=(0, 0, 0), specular=(1.0, 0.8, 0.4), roughness=0.5)
     assert diffuse_of(gold)[0] == 1
     assert min(diffuse_of(gold)) > 0.1
-    # A clear coat is no metal, and a picture is shown as paint.
+    # A clear coat is no metal, and a picture is drawn as paint.
     coat = replace(gold, diffuse=(0.5, 0.5, 0.5))
-    for other in (coat, replace(gold, texture_id="t"), replace(gold, specular=(0.2,) * 3)):
-        assert diffuse_of(other) == diffuse_of(replace(other, specular=(0, 0, 0)))
+    for material in (coat, replace(gold, texture_id="t"), replace(gold, specular=(0.2,) * 3)):
+        assert diffuse_of(material) == diffuse_of(replace(material, specular=(0, 0, 0)))

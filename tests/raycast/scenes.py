@@ -12,7 +12,7 @@ def geometry(
     items: NDArray[np.integer] | None = None,
     normals: NDArray[np.floating] | None = None,
 ) -> Geometry:
-    """One triangle per row of (F, 3, 3); item ids count from 1 unless given; uv = (x, y)."""
+    """One triangle per row of (F, 3, 3); item ids count from 1 by default; uv = (x, y)."""
     n = len(triangles)
     positions = np.asarray(triangles, np.float32).reshape(-1, 3)
     ids = np.arange(1, n + 1) if items is None else items
@@ -49,7 +49,7 @@ def camera(
     eye: tuple[float, float, float] = (0.0, 0.0, 0.0),
     towards: tuple[float, float, float] = (0.0, 0.0, -1.0),
 ) -> Camera:
-    """A camera of the published field of view."""
+    """A camera with the published field of view."""
     return Camera.look(
         Intrinsics.from_hfov(width, height), np.array(eye), np.array(towards, np.float64)
     )

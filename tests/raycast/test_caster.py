@@ -55,23 +55,23 @@ def test_every_pixel_agrees_with_testing_every_triangle(variant: str) -> None:
     hit = Caster(g, variant=variant).hit_record(view)
     same = hit.face == face
     assert (~same).sum() <= 2  # rays through an edge
-    seen = same & (face >= 0)
-    assert seen.mean() > 0.5
-    np.testing.assert_allclose(hit.depth_z[seen], depth[seen], rtol=1e-5)
+    both_hit = same & (face >= 0)
+    assert both_hit.mean() > 0.5
+    np.testing.assert_allclose(hit.depth_z[both_hit], depth[both_hit], rtol=1e-5)
 
 
-def test_a_hit_lies_on_its_pixels_ray_and_in_its_triangle() -> None:
+def test_a_hit_is_on_its_pixels_ray_and_in_its_triangle() -> None:
     g, view = soup(300, seed=1), camera(64, 48, eye=(0, 0, 4))
     hit = Caster(g).hit_record(view)
     origin, directions = view.rays()
     on_ray = origin + hit.depth_z[..., None] * directions
-    seen = hit.valid
-    np.testing.assert_allclose(hit.points.position_world[seen], on_ray[seen], atol=2e-6)
-    a = g.positions[g.faces[hit.face[seen], 0]]
-    off_plane = ((hit.points.position_world[seen] - a) * hit.geo_normal_world[seen]).sum(-1)
+    valid = hit.valid
+    np.testing.assert_allclose(hit.points.position_world[valid], on_ray[valid], atol=2e-6)
+    a = g.positions[g.faces[hit.face[valid], 0]]
+    off_plane = ((hit.points.position_world[valid] - a) * hit.geo_normal_world[valid]).sum(-1)
     assert np.abs(off_plane).max() < 5e-6
     np.testing.assert_allclose(
-        hit.points.uv[seen], hit.points.position_world[seen][:, :2], atol=2e-5
+        hit.points.uv[valid], hit.points.position_world[valid][:, :2], atol=2e-5
     )
 
 
@@ -79,12 +79,12 @@ def test_normals_have_unit_length_and_face_the_camera() -> None:
     view = camera(64, 48, eye=(0, 0, 4))
     hit = Caster(soup(300, seed=2)).hit_record(view)
     _origin, directions = view.rays()
-    seen = hit.valid
+    valid = hit.valid
     for normals in (hit.geo_normal_world, hit.points.shading_normal_world):
-        np.testing.assert_allclose(np.linalg.norm(normals[seen], axis=-1), 1, atol=1e-6)
-        assert not normals[~seen].any()
-    assert ((hit.geo_normal_world * directions)[seen].sum(-1) <= 1e-6).all()
-    assert ((hit.geo_normal_world * hit.points.shading_normal_world)[seen].sum(-1) >= -1e-6).all()
+        np.testing.assert_allclose(np.linalg.norm(normals[valid], axis=-1), 1, atol=1e-6)
+        assert not normals[~valid].any()
+    assert ((hit.geo_normal_world * directions)[valid].sum(-1) <= 1e-6).all()
+    assert ((hit.geo_normal_world * hit.points.shading_normal_world)[valid].sum(-1) >= -1e-6).all()
 
 
 def test_item_counts_are_the_item_buffers_pixels(variant: str) -> None:
@@ -106,7 +106,7 @@ def test_counts_do_not_depend_on_how_cameras_are_batched(monkeypatch: pytest.Mon
     np.testing.assert_array_equal(caster.item_counts(views), whole)
 
 
-def test_what_lies_behind_skipped_faces_is_seen() -> None:
+def test_rays_see_behind_skipped_faces() -> None:
     g = geometry(np.concatenate([wall(-1), wall(-3)]), np.array([1, 1, 2, 2]))
     caster = Caster(g)
     pane = np.array([True, True, False, False])
@@ -152,7 +152,7 @@ def test_degenerate_and_non_finite_triangles_are_never_hit(variant: str) -> None
     assert np.isfinite(hit.geo_normal_world).all()
 
 
-def test_depth_stays_within_the_triangle_even_where_its_plane_leaves_it() -> None:
+def test_depth_stays_within_the_triangle_even_if_its_plane_leaves_it() -> None:
     edge_on = np.array([[[-1, 1e-6, -1], [1, 1e-6, -1], [0, -1e-6, -3]]])
     view = camera(20, 21)
     claimed = np.zeros((21, 20), np.int32)

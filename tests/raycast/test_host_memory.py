@@ -1,4 +1,4 @@
-"""Arrays that end where the memory does reach the device; such a read ends the process, so a child makes it."""
+"""Arrays at the very end of mapped memory reach the device; a bad read would end the process, so a child does it."""
 
 import subprocess
 import sys

@@ -1,4 +1,4 @@
-"""Which LLVM is taken, and that the chosen variant traces rays."""
+"""Choice of the LLVM library, and that the chosen variant traces rays."""
 
 import os
 import subprocess
@@ -30,7 +30,7 @@ def test_a_librarys_version_is_read_from_its_real_name(
     assert variant.llvm_version(link) == version
 
 
-def test_the_newest_library_wins_over_an_old_one_named_by_the_environment(
+def test_the_newest_library_is_preferred_to_an_old_one_of_the_environment(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     for name in ("libLLVM-14.so.1", "libLLVM.so.18.1", "libLLVM.so.19.1"):
@@ -67,12 +67,12 @@ def test_the_library_of_a_wheel_is_found_in_the_environment_and_in_the_users_pac
     monkeypatch.setattr("site.getuserbase", lambda: str(tmp_path / "none"))
     monkeypatch.delenv("DRJIT_LIBLLVM_PATH", raising=False)
     assert variant.find_llvm() is None
-    there = str(tmp_path)
-    monkeypatch.setattr(place, there if place == "sys.prefix" else lambda: there)
+    folder = str(tmp_path)
+    monkeypatch.setattr(place, folder if place == "sys.prefix" else lambda: folder)
     assert variant.find_llvm() == tmp_path / "lib/libLLVM.so.23.1"
 
 
-# Says, when drjit is imported, what it would load, and stops there.
+# Stop at the import of drjit, and print the library that it would load.
 _AT_DRJIT = """
 import os, sys
 class Stop:
@@ -89,24 +89,24 @@ import {module}
     "module", ["pbrs_farm.transport.kernels.outside", "pbrs_farm.transport.path_tracer"]
 )
 def test_llvm_is_named_before_any_module_of_ours_imports_drjit(module: str) -> None:
-    # Dr.Jit loads LLVM as it is imported: a module that comes first would leave the scalar variant.
+    # Dr.Jit loads LLVM at import: a module imported earlier would leave the scalar variant.
     environment = {k: v for k, v in os.environ.items() if k != "DRJIT_LIBLLVM_PATH"}
     command = [sys.executable, "-c", _AT_DRJIT.format(module=module)]
     done = subprocess.run(command, env=environment, capture_output=True, text=True, check=True)
     assert done.stdout.strip() == str(variant.find_llvm())
 
 
-def test_the_version_that_compiles_is_told_of_variants_that_compile(
+def test_the_compiled_version_is_reported_for_compiled_variants(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     drjit = SimpleNamespace(detail=SimpleNamespace(llvm_version=lambda: (19, 1, 7)))
-    monkeypatch.setattr(variant, "_module", lambda _name: drjit)
+    monkeypatch.setattr(variant, "import_renderer", lambda _name: drjit)
     assert variant.llvm_of_variant("llvm_ad_rgb") == "19.1.7"
     assert variant.llvm_of_variant("scalar_rgb") == ""
     assert variant.llvm_of_variant("cuda_ad_rgb") == ""
 
 
-def test_the_chosen_variant_is_one_that_traces_rays() -> None:
+def test_the_chosen_variant_traces_rays() -> None:
     name = variant.choose_variant()
     assert name in ("cuda_ad_rgb", "llvm_ad_rgb", "scalar_rgb")
     assert variant.mitsuba().variant() == name

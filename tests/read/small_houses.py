@@ -48,12 +48,12 @@ def png(width: int = 2, height: int = 2, rgb: tuple[int, int, int] = (200, 30, 4
 
 
 def texture(data: bytes, name: str, media_type: str = "image/png") -> Texture:
-    """A Texture with the id that readers give it."""
+    """A Texture with the id that readers would give it."""
     return Texture(hashlib.sha256(data).hexdigest()[:16], name, media_type, data)
 
 
 def quad(corners: list[list[float]], material: int, name: str = "quad") -> Surface:
-    """Two triangles over four corners in order, uv in metres-like odd numbers, flat normals."""
+    """Two triangles over four corners in order, uv with odd numbers, flat normals."""
     p = np.array(corners, np.float32)
     n = np.cross(p[1] - p[0], p[2] - p[0])
     return Surface(
@@ -67,7 +67,7 @@ def quad(corners: list[list[float]], material: int, name: str = "quad") -> Surfa
 
 
 def full_house() -> House:
-    """A house in which every noun and every optional field of house.py occurs once."""
+    """A house in which every type and every optional field of house.py occurs once."""
     red, gif = texture(png(), "red"), texture(b"GIF89a...", "old", "image/gif")
     floor = quad([[0, 0, 0], [0, 0, 4], [5, 0, 4], [5, 0, 0]], 0, "floor")
     pane = quad([[1, 1, 0], [2, 1, 0], [2, 2, 0], [1, 2, 0]], 1, "pane")

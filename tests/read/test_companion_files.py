@@ -1,4 +1,4 @@
-"""The house step notices every file its source read: each test changes each of them."""
+"""The house step notices changes of every file its source read: each test changes each file."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ PNG = picture((10, 20, 30), "PNG")
 
 
 class HouseStep:
-    """The house step of one source over one store: reads the house when its digest changed."""
+    """The house step of one source over one store: reads the house if its digest changed."""
 
     def __init__(self, named: Callable[[], SourceRef]) -> None:
         self._named = named
@@ -127,7 +127,7 @@ def test_a_suncg_house_notices_its_architecture_file(tmp_path: Path) -> None:
     assert_notices(lambda: resolve(str(folder)), files_below(tmp_path / "wall"))
 
 
-def test_a_suncg_house_leaves_other_houses_and_models_alone(tmp_path: Path) -> None:
+def test_other_houses_and_models_do_not_change_a_suncg_house(tmp_path: Path) -> None:
     house_id = suncg_root.write_root(tmp_path)
     step = HouseStep(lambda: resolve(str(tmp_path / "house" / house_id)))
     step.was_kept()
@@ -156,7 +156,7 @@ def test_a_home_that_needs_the_programs_models_notices_another_package(
     def use(package: homes_package.Package | None) -> None:
         monkeypatch.setattr(homes_package, "cached", lambda: package)
 
-    found = []
+    package_names = []
     for version in (homes_package.TESTED_VERSION, "9.9", None):
         note = "" if version == homes_package.TESTED_VERSION else "another version"
         use(
@@ -164,20 +164,20 @@ def test_a_home_that_needs_the_programs_models_notices_another_package(
             if version is None
             else homes_package.Package(version, "0" * 64, tmp_path / "jar", note)
         )
-        found.append(resolve(str(needing)).fingerprint)
+        package_names.append(resolve(str(needing)).fingerprint)
         assert resolve(str(whole)).companions == ""
-    assert len(set(found)) == 3
+    assert len(set(package_names)) == 3
     source = resolve(str(needing))
-    assert found[0] == source.sha256, "the tested package leaves digests as they were"
+    assert package_names[0] == source.sha256, "the tested package leaves digests as they were"
     use(homes_package.Package("9.9", "0" * 64, tmp_path / "jar", "another version"))
     with pytest.raises(MachineFailed, match="package"):
         read_house(source, ReadFields())
 
 
-def test_a_companion_that_changed_since_submission_is_told(tmp_path: Path) -> None:
+def test_a_companion_changed_since_submission_is_reported(tmp_path: Path) -> None:
     for kind, write in FORMATS.items():
         if kind in ("sweethome3d", "scenestate"):
-            continue  # one file
+            continue  # formats of a single file
         folder = tmp_path / kind
         folder.mkdir()
         source = write(folder, PNG)
@@ -217,7 +217,7 @@ def test_files_that_houses_share_are_read_once(
     assert {name.split("/")[0] for name in read} == {"house", "wall"}, "no model is opened again"
 
 
-def test_a_scene_with_side_files_is_left_where_it_lies(tmp_path: Path) -> None:
+def test_a_scene_with_side_files_is_not_copied(tmp_path: Path) -> None:
     source = FORMATS["gltf"](tmp_path, PNG)
     ((entry, ref),) = entries_from_arguments([source.location])
     assert is_left_in_place(ref)

@@ -1,4 +1,4 @@
-"""What is left out of a house while it is read is a note, in words that name file and line."""
+"""Every part that a reader leaves out is a note that names file and line."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve
 from pbrs_farm.read.mesh.obj import parse_obj
-from tests.read.suncg.suncg_root import HOUSE, at, house_json, thing, write_root
+from tests.read.suncg.suncg_root import HOUSE, house_json, object_node, placement, write_root
 
 
 def _house(tmp_path, edit=lambda _plain: None, files=None):
@@ -35,7 +35,7 @@ def test_a_node_of_an_unknown_type_is_a_note(tmp_path):
 
 
 def test_an_object_900_m_away_is_a_note(tmp_path):
-    far = thing("0_90", "chair", at(900, 0.05, 1))
+    far = object_node("0_90", "chair", placement(900, 0.05, 1))
     house = _house(tmp_path, lambda p: p["levels"][0]["nodes"].append(far))
     assert "far-away" in _kinds(house)
     assert "far-away" not in _kinds(_house(tmp_path))
@@ -68,7 +68,7 @@ def test_a_room_mesh_cut_short_is_a_note(tmp_path):
         ("v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\nf 1 two 3\n", "`f` line 2: 'two' is not an index"),
     ],
 )
-def test_a_word_that_is_no_number_is_told_in_our_words(text, says):
+def test_an_invalid_number_is_refused_without_library_words(text, says):
     with pytest.raises(BadHouse) as caught:
         parse_obj(text.encode(), "m.obj")
     assert says in str(caught.value)

@@ -1,4 +1,4 @@
-"""What every reader does alike: pictures, notes, and reading strictly."""
+"""Behaviour common to all readers: pictures, notes, strict reading."""
 
 from __future__ import annotations
 
@@ -31,8 +31,8 @@ def texture_notes(house: House) -> list[str]:
 
 
 def is_cut_out(house: House, texture_id: str) -> bool:
-    (found,) = {m.alpha_cutout for m in house.materials if m.texture_id == texture_id}
-    return found
+    (is_cut,) = {m.alpha_cutout for m in house.materials if m.texture_id == texture_id}
+    return is_cut
 
 
 @formats
@@ -61,7 +61,7 @@ def test_only_alpha_below_one_half_makes_a_cut_out(tmp_path: Path, kind: str) ->
 @pytest.mark.parametrize(
     ("data", "expected"), [(None, "missing-texture"), (b"no picture", "unreadable-texture")]
 )
-def test_a_picture_that_cannot_be_used_is_one_note_and_strictly_an_error(
+def test_an_unusable_picture_is_one_note_and_an_error_if_strict(
     tmp_path: Path, kind: str, data: bytes | None, expected: str
 ) -> None:
     source = FORMATS[kind](tmp_path, data)
@@ -74,7 +74,7 @@ def test_a_picture_that_cannot_be_used_is_one_note_and_strictly_an_error(
 
 @pytest.mark.quick(4)
 @formats
-def test_what_the_reader_accepts_strictly_the_house_step_accepts(tmp_path: Path, kind: str) -> None:
+def test_the_house_step_accepts_a_strictly_read_house(tmp_path: Path, kind: str) -> None:
     source = FORMATS[kind](tmp_path, picture())
     assert {n.kind for n in read_house(source, STRICT).notes} <= HARMLESS
     repaired_house(source, STRICT_RECIPE)

@@ -41,9 +41,9 @@ def test_whatever_the_bytes_of_a_glb_the_outcome_is_a_house_or_a_bad_house(
     changes: list[tuple[int, bytes, int]],
 ) -> None:
     data = BYTES
-    for at, new, n_gone in changes:
-        at %= len(data) + 1
-        data = data[:at] + new + data[at + n_gone :]
+    for start, new, n_gone in changes:
+        start %= len(data) + 1
+        data = data[:start] + new + data[start + n_gone :]
     file = outcome(lambda: read_gltf(data, "scene.glb", fields=ReadFields()))
     assert file in ("", "scene.glb")
 
@@ -87,8 +87,8 @@ def test_any_value_anywhere_in_house_json_gives_a_house_or_a_bad_house(
 @settings(max_examples=examples(100), deadline=10_000)
 @given(st.binary(max_size=400))
 def test_random_bytes_are_refused(data: bytes) -> None:
-    for one, other in ((data, BUNDLE[1]), (BUNDLE[0], data)):
+    for json_bytes, arrays in ((data, BUNDLE[1]), (BUNDLE[0], data)):
         with pytest.raises(BadHouse):
-            house_from_bundle(one, other)
+            house_from_bundle(json_bytes, arrays)
     with pytest.raises(BadHouse):
         read_gltf(data, "scene.glb", fields=ReadFields())

@@ -1,4 +1,4 @@
-"""A word -> a source; a source that changed since it was named is told, whatever its kind."""
+"""From a word to a source; a source that changed since it was named is reported, for every format."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pbrs_farm.prepare.source import resolve, suncg_list
 from tests.example_homes import example_homes
 
 
-def test_a_suncg_house_that_changed_since_submission_is_told(tmp_path: Path) -> None:
+def test_a_suncg_house_changed_since_submission_is_reported(tmp_path: Path) -> None:
     house = tmp_path / "house/0a1b/house.json"
     house.parent.mkdir(parents=True)
     house.write_text("{}")
@@ -23,7 +23,7 @@ def test_a_suncg_house_that_changed_since_submission_is_told(tmp_path: Path) -> 
         read_house(source, ReadFields())
 
 
-def test_a_file_that_changed_since_submission_is_told(tmp_path: Path) -> None:
+def test_a_file_changed_since_submission_is_reported(tmp_path: Path) -> None:
     home = tmp_path / "home.sh3d"
     home.write_bytes(b"PK")
     source = resolve(str(home))
@@ -43,7 +43,9 @@ def test_another_version_of_the_example_homes_is_the_machines_fault() -> None:
 
 
 @pytest.mark.parametrize("name", ["chair.fbx", "house.blend", "house.SKP", "room.dae"])
-def test_a_file_of_another_program_says_what_is_read(tmp_path: Path, name: str) -> None:
+def test_a_file_of_another_program_is_refused_with_the_readable_formats(
+    tmp_path: Path, name: str
+) -> None:
     path = tmp_path / name
     path.write_bytes(b"bytes")
     with pytest.raises(BadHouse, match="files are not read"):

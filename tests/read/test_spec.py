@@ -1,4 +1,4 @@
-"""What modules cite stands in docs/spec."""
+"""Every document and section that modules cite exists in docs/spec."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ _CITATION = re.compile(
 
 def citations() -> set[tuple[str, str]]:
     """(document, section or "") of every citation in the packages."""
-    found = set()
+    cited = set()
     for package in ("pbrs_farm", "workers"):
         for path in (ROOT / package).rglob("*.py"):
             for document, section, of_paper in _CITATION.findall(path.read_text("utf-8")):
-                found.add((document or "paper", section or of_paper))
-    return found
+                cited.add((document or "paper", section or of_paper))
+    return cited
 
 
 def test_every_cited_section_is_in_its_document() -> None:

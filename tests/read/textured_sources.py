@@ -1,4 +1,4 @@
-"""One textured source of each format, written as files for the tests all readers share."""
+"""One textured source of each format, written as files for the tests common to all readers."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def suncg(folder: Path, picture: bytes | None) -> SourceRef:
     house_id = suncg_root.write_root(folder)
     nodes = [
         suncg_root.room("0_0", "fr_0rm_0", [1], ["Bedroom"]),
-        suncg_root.thing("0_1", "chair", suncg_root.at(1, 0.05, 1)),
+        suncg_root.object_node("0_1", "chair", suncg_root.placement(1, 0.05, 1)),
     ]
     house = suncg_root.house_json() | {"levels": [{"id": "0", "nodes": nodes}]}
     suncg_root.write(folder / f"house/{house_id}/house.json", json.dumps(house))
@@ -57,12 +57,12 @@ def suncg(folder: Path, picture: bytes | None) -> SourceRef:
 
 
 def gltf(folder: Path, picture: bytes | None) -> SourceRef:
-    """A .glb of two rooms with a sofa whose picture lies beside the file."""
+    """A .glb of two rooms with a sofa whose picture is beside the file."""
     return _with_picture(folder, "scene.glb", _textured_rooms().glb(), picture)
 
 
 def habitat(folder: Path, picture: bytes | None) -> SourceRef:
-    """A data set whose stage has a sofa with a picture that lies beside the stage."""
+    """A data set whose stage has a sofa with a picture beside the stage."""
     path = dataset(folder, _textured_rooms())
     if picture is not None:
         (folder / "stages/picture.any").write_bytes(picture)
@@ -70,7 +70,7 @@ def habitat(folder: Path, picture: bytes | None) -> SourceRef:
 
 
 def usd(folder: Path, picture: bytes | None) -> SourceRef:
-    """A stage of a room with a sofa whose picture lies beside the file."""
+    """A stage of a room with a sofa whose picture is beside the file."""
     home = UsdHome(folder / "scene.usda")
     walls_of(home, "/World", 0, 4, 0, 3)
     paint = home.material("paint", picture="./picture.any", is_cut=True)
@@ -79,14 +79,14 @@ def usd(folder: Path, picture: bytes | None) -> SourceRef:
 
 
 def scenestate(folder: Path, picture: bytes | None) -> SourceRef:
-    """Two rooms whose floors have the picture, which the file itself holds."""
+    """Two rooms whose floors have the picture, embedded in the file."""
     path = folder / "home.scenestate.json"
     path.write_text(json.dumps(scenestate_files.rent3d_like(picture)))
     return resolve(str(path))
 
 
 def front3d(folder: Path, picture: bytes | None) -> SourceRef:
-    """A flat whose floors have the picture, which lies in the folder of textures."""
+    """A flat whose floors have the picture, from the folder of textures."""
     path = front3d_files.write_house(folder, picture=picture)
     house = front3d_files.front_house(picture_jid="jid-oak")
     house["scene"]["room"][0]["children"] = [
@@ -106,7 +106,7 @@ def _textured_rooms() -> Scene:
 
 
 def single_object(folder: Path, picture: bytes | None) -> SourceRef:
-    """An OBJ model without context and its MTL, which names the picture."""
+    """A lone OBJ model and its MTL, which names the picture."""
     (folder / "thing.mtl").write_text(MTL)
     return _with_picture(folder, "thing.obj", QUAD_OBJ.encode(), picture)
 
@@ -120,7 +120,7 @@ def _with_picture(folder: Path, name: str, data: bytes, picture: bytes | None) -
     return resolve(str(folder / name))
 
 
-# IFC is not among them: its files carry no pictures in practice, and its reader looks at none.
+# IFC is excluded: its files have no pictures in practice, and its reader ignores them.
 FORMATS: Final[dict[str, Callable[[Path, bytes | None], SourceRef]]] = {
     "sweethome3d": sweethome3d,
     "suncg": suncg,
@@ -131,4 +131,4 @@ FORMATS: Final[dict[str, Callable[[Path, bytes | None], SourceRef]]] = {
     "front3d": front3d,
     "object": single_object,
 }
-"""Format -> writes a source with that picture (None: the file is missing) and names it."""
+"""Format -> writes a source with that picture (None: the file is missing) and returns it."""

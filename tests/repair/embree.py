@@ -1,4 +1,4 @@
-"""An Occluder on embreex, for tests: not the caster that repair is given in the pipeline."""
+"""An Occluder on embreex, for tests: independent of the caster that the pipeline gives to repair."""
 
 from __future__ import annotations
 
@@ -25,11 +25,11 @@ class EmbreeOccluder:
         max_distance: float = np.inf,
     ) -> tuple[NDArray[np.float32], NDArray[np.int32]]:
         """Distance, inf for a miss, and face, -1 for a miss, of each ray's first hit."""
-        found = self._scene.run(
+        hits = self._scene.run(
             np.ascontiguousarray(origins, np.float32),
             np.ascontiguousarray(directions, np.float32),
             output=True,
             dists=np.full(len(origins), min(max_distance, 1e30), np.float32),
         )
-        face = found["primID"].astype(np.int32)
-        return np.where(face < 0, np.float32(np.inf), found["tfar"]), face
+        face = hits["primID"].astype(np.int32)
+        return np.where(face < 0, np.float32(np.inf), hits["tfar"]), face

@@ -1,4 +1,4 @@
-"""Homes as strangers draw them, by seed: odd corners, overlaps, shells, names that steer a screen."""
+"""Random homes by seed: odd corners, overlaps, shells, names with terminal control characters."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ NAMES = (
     "Hall", "A\n[   0.1 s] forged", "\u202eevil\u202c", "居間", "سالن", "x" * 100_000, "", "a\u0301" * 40,
     "fenster 1.3m oknó", "Wall window floor ceiling", "CON", "../../up", "\x7f\x9b31m", "\U0001f6aa",
 )  # fmt: skip
-"""Of rooms, pieces and nodes: lines, directions, marks, lengths, words of other things."""
+"""For rooms, pieces and nodes: newlines, writing directions, accents, lengths, words of other items."""
 
 ODD_WINDOWS = ("Fenster_03", "okno.glass", "WINDOWLESS door", "窓", "Pane#2", "Mullion window.001")
 
 
 def random_home(seed: int) -> tuple[str, bytes]:
-    """(file name, bytes) of a home; four kinds of fault by turns, their numbers by the seed."""
+    """(file name, bytes) of a home; the four kinds of fault alternate, with parameters from the seed."""
     rng = np.random.default_rng(seed)
     kinds: tuple[Callable[[np.random.Generator], bytes], ...] = (
         _cornered,
@@ -47,7 +47,7 @@ def _name(rng: np.random.Generator, names: tuple[str, ...] = NAMES) -> str:
 
 
 def _xml_name(rng: np.random.Generator) -> str:
-    # XML holds no control characters but line ends.
+    # XML holds no control characters except line ends.
     text = "".join(c for c in _name(rng) if c == "\n" or c.isprintable() or ord(c) > 0x9F)
     return quoteattr(text)
 
@@ -82,7 +82,7 @@ def _pieces(rng: np.random.Generator, n: int) -> str:
 
 
 def _opening(rng: np.random.Generator, a: Point, b: Point, index: int) -> str:
-    # In the middle of a wall, turned with it, sometimes wider or thinner than it.
+    # In the middle of a wall, turned with it, sometimes wider or thinner.
     angle = math.atan2(b[1] - a[1], b[0] - a[0])
     return (
         f"<doorOrWindow id='o{index}' name={quoteattr(_name(rng, ODD_WINDOWS))} model='window'"
@@ -93,7 +93,7 @@ def _opening(rng: np.random.Generator, a: Point, b: Point, index: int) -> str:
 
 
 def _cornered(rng: np.random.Generator) -> bytes:
-    """One room of odd corners with windows."""
+    """One room with odd corners and windows."""
     corners = [(100 * x + 400, 100 * y + 400) for x, y in _star(rng, int(rng.integers(3, 12)))]
     body = _walls(rng, corners, 0, joined=bool(rng.integers(2))) + _pieces(rng, 4)
     for k in range(int(rng.integers(0, 3))):
@@ -103,7 +103,7 @@ def _cornered(rng: np.random.Generator) -> bytes:
 
 
 def _overlapping(rng: np.random.Generator) -> bytes:
-    """A large room, and smaller ones that lie in its outline or reach into it, with own partitions."""
+    """A large room, and smaller ones inside or across its outline, with separate partitions."""
     box: list[Point] = [(0, 0), (800, 0), (800, 600), (0, 600)]
     rooms, body = _room(rng, box), _walls(rng, box, 0)
     for k in range(int(rng.integers(1, 4))):
@@ -117,7 +117,7 @@ def _overlapping(rng: np.random.Generator) -> bytes:
 
 
 def _fan(rng: np.random.Generator) -> bytes:
-    """A room of open sheets; floor and ceiling are fans of triangles, of one middle or one corner."""
+    """A room of open sheets; floor and ceiling are fans of triangles around the middle or a corner."""
     s, corners = Scene(), _star(rng, int(rng.integers(3, 12)))
     for name, y in (("Floor", 0.0), ("Ceiling", float(rng.uniform(2.0, 3.2)))):
         ring = [[x, y, z] for x, z in corners]
@@ -130,8 +130,8 @@ def _fan(rng: np.random.Generator) -> bytes:
         [[a[0], 0, a[1]], [b[0], 0, b[1]], [b[0], height, b[1]], [a[0], height, a[1]]]
         for a, b in zip(corners, [*corners[1:], corners[0]], strict=True)
     ]
-    kept = [side for side in sides if rng.random() > 0.1]
-    s.node("Walls", mesh=s.mesh(kept or sides))
+    sides_left = [side for side in sides if rng.random() > 0.1]
+    s.node("Walls", mesh=s.mesh(sides_left or sides))
     s.node(_name(rng), mesh=s.box([-0.3, 0, -0.3], [0.3, 0.8, 0.3]))
     s.node(_name(rng, ODD_WINDOWS), mesh=s.box([0.4, 0.9, -0.05], [1.2, 2.0, 0.05]))
     return s.glb()
@@ -149,7 +149,7 @@ def _fan_mesh(s: Scene, ring: list[list[float]], from_middle: bool) -> int:
 
 
 def _shells(rng: np.random.Generator) -> bytes:
-    """Rooms that are one box each, seen from inside or outside, apart, touching or overlapping."""
+    """Rooms of one box each, seen from inside or outside, separate, touching or overlapping."""
     s = Scene()
     for k in range(int(rng.integers(1, 4))):
         size = rng.uniform([2.0, 2.2, 2.0], [6.0, 3.2, 6.0])

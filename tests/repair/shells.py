@@ -1,4 +1,4 @@
-"""What tests ask of a repaired shell: is it closed, does anything coincide, what is seen."""
+"""Measures of a repaired shell: closedness, coinciding faces, visible surfaces."""
 
 from __future__ import annotations
 
@@ -18,15 +18,15 @@ def structure_of(house: House) -> House:
 
 
 def unpaired_edges(house: House) -> F64:
-    """(N,) lengths of the structure's edges that have no twin in the other direction."""
+    """(N,) lengths of the structure's edges without a twin in the other direction."""
     g = geometry_from_house(structure_of(house))
     points, corner = np.unique(g.positions, axis=0, return_inverse=True)
     f = np.ravel(corner)[g.faces]
     edges = np.concatenate([f[:, [0, 1]], f[:, [1, 2]], f[:, [2, 0]]]).astype(np.int64)
     n = len(points)
-    there, back = edges[:, 0] * n + edges[:, 1], edges[:, 1] * n + edges[:, 0]
-    keys, counts = np.unique(np.concatenate([there, back]), return_counts=True)
-    forward = np.searchsorted(np.sort(there), keys, "right") - np.searchsorted(np.sort(there), keys)
+    forth, back = edges[:, 0] * n + edges[:, 1], edges[:, 1] * n + edges[:, 0]
+    keys, counts = np.unique(np.concatenate([forth, back]), return_counts=True)
+    forward = np.searchsorted(np.sort(forth), keys, "right") - np.searchsorted(np.sort(forth), keys)
     alone = keys[2 * forward != counts]
     return np.asarray(np.linalg.norm(points[alone // n] - points[alone % n], axis=1), np.float64)
 
@@ -39,7 +39,7 @@ def rays_from(origin: tuple[float, float, float], n: int = 20_000) -> tuple[F64,
 
 
 def seen_from(house: House, origin: tuple[float, float, float]) -> dict[tuple[str, str], int]:
-    """(item id, surface name) -> rays that see it first, of the structure alone; "" = the sky."""
+    """(item id, surface name) -> number of rays that hit it first, of the structure only; "" = the sky."""
     shell = structure_of(house)
     g = geometry_from_house(shell)
     names = [(item.id, s.name) for _, item, _, s in shell.surfaces()]
@@ -47,15 +47,15 @@ def seen_from(house: House, origin: tuple[float, float, float]) -> dict[tuple[st
     _, face = EmbreeOccluder(shell).first_hit(
         origins.astype(np.float32), directions.astype(np.float32)
     )
-    found: dict[tuple[str, str], int] = {}
+    n_hits: dict[tuple[str, str], int] = {}
     for number in np.where(face < 0, -1, g.face_surface[face]).tolist():
         key = names[number] if number >= 0 else ("", "")
-        found[key] = found.get(key, 0) + 1
-    return found  # fmt: skip
+        n_hits[key] = n_hits.get(key, 0) + 1
+    return n_hits  # fmt: skip
 
 
 def coinciding_share(house: House, origin: tuple[float, float, float]) -> float:
-    """Share of rays from origin behind whose first face another one lies within half a millimetre.
+    """Share of rays from origin with a second face within half a millimetre behind the first.
 
     Where faces coincide it is their share of the view; at edges seen from outside it is a sliver.
     """
@@ -72,7 +72,7 @@ def coinciding_share(house: House, origin: tuple[float, float, float]) -> float:
 
 
 def leaning_area(house: House) -> float:
-    """Square metres of the structure's faces that are neither upright nor level, slivers aside."""
+    """Area in square metres of the structure's oblique faces, without slivers."""
     area = 0.0
     for item in structure_of(house).items:
         for s in item.surfaces:

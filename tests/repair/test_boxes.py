@@ -1,4 +1,4 @@
-"""Boxes of repaired houses: the mesh fills them, along the axes that the source gave."""
+"""Boxes of repaired houses: filled by the mesh, along the axes of the source."""
 
 from __future__ import annotations
 
@@ -23,15 +23,15 @@ CHAIR = NYU40_NAMES.index("chair")
 
 
 def errors_mm(house: House) -> F64:
-    """How far each side of each item's box is from its triangles."""
-    found = []
+    """Distance in mm of each side of each item's box from its triangles."""
+    errors = []
     for item in house.items:
         points = corners_of_surfaces(item.surfaces).reshape(-1, 3)
         if len(points):
             local = (points - item.oriented_box.centre) @ item.oriented_box.axes
             sides = np.array([-local.min(0), local.max(0)]) - item.oriented_box.half
-            found.append(1000 * np.abs(sides).max())
-    return np.array(found)
+            errors.append(1000 * np.abs(sides).max())
+    return np.array(errors)
 
 
 def grown(item: Item) -> Item:
@@ -46,7 +46,7 @@ def test_a_box_larger_than_its_mesh_becomes_the_meshs() -> None:
     assert errors_mm(planned).max() > 90
     house, _report = repair(planned, RepairFields())
     assert errors_mm(house).max() < 0.01
-    # Its axes stay.
+    # Its axes are unchanged.
     axes = {item.id: item.box.axes for item in planned.items if item.box is not None}
     boxed = [item for item in house.items if item.id in axes]
     assert len(boxed) > 3

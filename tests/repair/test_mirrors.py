@@ -1,4 +1,4 @@
-"""A piece of class mirror has a mirror's surface where its large flat part faces the room."""
+"""A piece of class mirror gets a mirror's surface on its large flat part facing the room."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def board(name: str, size: tuple[float, float, float], at: tuple[float, float, f
 
 
 def with_item(surfaces: tuple[Surface, ...], *, nyu40: int = MIRROR, behind: bool = False) -> House:
-    """The small home with an item near the wall at small z, or at large z, of its first room."""
+    """The small home with an item near the wall at small z of its first room, or at large z if behind."""
     home = builtin_home()
     room = home.rooms[0]
     points = np.asarray(room.polygon)
@@ -45,7 +45,7 @@ def with_item(surfaces: tuple[Surface, ...], *, nyu40: int = MIRROR, behind: boo
 
 
 def glass_of(house: House) -> tuple[np.ndarray, float]:
-    """Mean normal and area of what mirrors of the item."""
+    """Mean normal and area of the item's mirrors."""
     item = next(i for i in house.items if i.id == "glass")
     vectors = [
         np.cross(c[:, 1] - c[:, 0], c[:, 2] - c[:, 0]).sum(0) / 2
@@ -60,10 +60,10 @@ def glass_of(house: House) -> tuple[np.ndarray, float]:
 
 @pytest.mark.parametrize("behind", [False, True])
 def test_a_white_board_mirrors_on_the_side_that_faces_the_room(behind: bool) -> None:
-    house, made = with_mirrors(
+    house, mirrors = with_mirrors(
         with_item((board("all", (0.6, 0.9, 0.02), (0, 0, 0)),), behind=behind)
     )
-    assert made == ("glass",)
+    assert mirrors == ("glass",)
     normal, area = glass_of(house)
     np.testing.assert_allclose(normal, [0, 0, -1.0 if behind else 1.0], atol=1e-6)
     assert area == pytest.approx(0.54, abs=1e-5)
@@ -88,20 +88,20 @@ def test_the_frame_of_a_mirror_stays() -> None:
     assert kinds[1:5] == [MaterialKind.OPAQUE] * 4
 
 
-def test_what_mirrors_already_or_is_no_mirror_or_has_no_flat_part_stays() -> None:
+def test_existing_mirrors_other_items_and_curved_ones_are_unchanged() -> None:
     sheet = board("all", (0.6, 0.9, 0.02), (0, 0, 0))
-    other = with_item((sheet,), nyu40=MIRROR - 1)
-    assert with_mirrors(other)[1] == ()
+    unlabelled = with_item((sheet,), nyu40=MIRROR - 1)
+    assert with_mirrors(unlabelled)[1] == ()
     once, _made = with_mirrors(with_item((sheet,)))
-    again, made = with_mirrors(once)
-    assert made == ()
+    again, mirrors = with_mirrors(once)
+    assert mirrors == ()
     assert again.items == once.items
     ball = trimesh.creation.icosphere(subdivisions=3, radius=0.3)
     round_one = Surface("ball", ball.vertices.astype(np.float32), ball.faces.astype(np.int32), 0)
     assert with_mirrors(with_item((round_one,)))[1] == ()
 
 
-def test_repair_tells_which_mirrors_it_made() -> None:
+def test_repair_reports_the_mirrors_it_made() -> None:
     _house, report = repair(with_item((board("all", (0.6, 0.9, 0.02), (0, 0, 0)),)), RepairFields())
     assert report.mirrors == ("glass",)
 
@@ -114,14 +114,14 @@ DRESSING_TABLE = (
 
 
 def test_the_mirror_of_another_piece_mirrors_and_its_label_stays() -> None:
-    house, made = with_mirrors(with_item(DRESSING_TABLE, nyu40=DRESSER))
-    assert made == ("glass",)
+    house, mirrors = with_mirrors(with_item(DRESSING_TABLE, nyu40=DRESSER))
+    assert mirrors == ("glass",)
     normal, area = glass_of(house)
     np.testing.assert_allclose(normal, [0, 0, 1], atol=1e-6)
     assert area == pytest.approx(0.42, abs=1e-5)
     item = next(i for i in house.items if i.id == "glass")
     assert (item.nyu40, item.n_faces) == (DRESSER, 36)
-    # By the material's name as well; a mirror's lamp is none.
+    # The material's name counts as well; a mirror's lamp is not a mirror.
     for name, expected in (("Spiegel", ("glass",)), ("Mirror light", ())):
         home = with_item((board("part 0", (0.6, 0.9, 0.02), (0, 0, 0)),), nyu40=DRESSER)
         material = replace(home.materials[-1], name=name)

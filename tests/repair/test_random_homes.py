@@ -1,4 +1,4 @@
-"""Sixty homes of strangers, by seed: repair ends, loses no wall, and every text is one safe line."""
+"""Sixty random homes by seed: repair ends, loses no wall, and every text is one safe line."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_a_strangers_home_is_repaired_without_losing_a_wall(seed: int, tmp_path:
     assert report.structure.walls_lost == ()
     assert after.is_repaired
     assert len(unpaired_edges(after)) == 0 or name.endswith("glb")
-    # Text of strangers is one safe line, and what is stored reads back.
+    # Each text is one safe line, and the stored house reads back.
     assert all(note.place == shown(note.place, 120) for note in after.notes)
     assert "\n[   0.1 s] forged" not in summary_of_report(report)
     assert house_from_bundle(*bundle_from_house(after)).id == after.id

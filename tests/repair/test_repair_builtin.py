@@ -1,4 +1,4 @@
-"""What repair does to the built-in home, measured on its triangles."""
+"""Effects of repair on the built-in home, measured on its triangles."""
 
 from __future__ import annotations
 

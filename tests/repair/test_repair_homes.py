@@ -1,4 +1,4 @@
-"""The nine example homes: closed spaces are tight, shells closed. Skipped where not fetched."""
+"""The nine example homes: closed spaces are tight, shells closed. Skipped if not fetched."""
 
 from __future__ import annotations
 

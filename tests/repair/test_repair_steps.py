@@ -1,4 +1,4 @@
-"""The table of the steps of repair, and a step that is added in one file."""
+"""The table of the steps of repair, and a step added in one file."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.repair import repair_house
 from pbrs_farm.repair.repair_report import RepairReport, StructureReport
 
-# repair_house.py is run with two functions and a row more, as if they stood in it.
+# Run repair_house.py with two more functions and a row.
 ADDED = '''
 import sys
 
@@ -40,7 +40,7 @@ raise SystemExit(main(["repair", "builtin", "--out", "o"]))
 
 
 @pytest.mark.kinds("repair-step")
-def test_a_step_that_is_added_in_one_file_is_done_and_reported(tmp_path: Path) -> None:
+def test_a_step_added_in_one_file_runs_and_is_reported(tmp_path: Path) -> None:
     words = [sys.executable, "-c", ADDED, str(repair_house.__file__)]
     done = subprocess.run(words, capture_output=True, text=True, cwd=tmp_path)
     assert done.returncode == 0, done.stderr

@@ -31,7 +31,7 @@ def _furnished(*pieces: Item) -> House:
     return house([*walls_around(RECT), *covers(r), *pieces], [r])
 
 
-def test_overlapping_pieces_are_told_with_their_volume() -> None:
+def test_overlapping_pieces_are_reported_with_their_volume() -> None:
     audit = furniture_audit(_furnished(_piece("a", (1, 0.25, 1)), _piece("b", (1.4, 0.25, 1))))
     (overlap,) = audit.overlaps
     assert (overlap.a, overlap.b) == ("a", "b")
@@ -50,13 +50,15 @@ def test_a_piece_in_the_air_floats_and_one_on_another_does_not() -> None:
     assert [(f.item_id, f.gap_m) for f in audit.floating] == [("air", 1.0)]
 
 
-def test_a_piece_that_stands_twice_is_a_duplicate() -> None:
+def test_a_piece_placed_twice_is_a_duplicate() -> None:
     audit = furniture_audit(_furnished(_piece("a", (1, 0.25, 1)), _piece("b", (1, 0.25, 1))))
     assert audit.duplicates == (("a", "b"),)
     assert audit.overlaps[0].share == 1.0
 
 
-def test_a_crowd_is_audited_in_part_and_the_rest_is_told(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_crowd_is_audited_in_part_with_a_note_of_the_rest(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     monkeypatch.setattr(furniture_audit_module, "MAX_PIECES", 4)
     monkeypatch.setattr(furniture_audit_module, "MAX_PAIRS", 2)
     crowd = [_piece(f"p{k}", (1 + 0.01 * k, 0.25, 1)) for k in range(9)]
@@ -67,13 +69,13 @@ def test_a_crowd_is_audited_in_part_and_the_rest_is_told(monkeypatch: pytest.Mon
     assert "only a part of it was checked, 5 pieces not checked." in text
 
 
-def test_leaks_of_no_ray_are_not_measured_rather_than_none() -> None:
+def test_leaks_without_rays_are_unmeasured_rather_than_zero() -> None:
     text = summary_of_report(RepairReport(house_id="h", leaks=LeakReport()))
     assert "Leaks were not measured" in text
     assert "No light leaks" not in text
 
 
-def test_the_words_say_what_was_wrong(repaired: tuple[House, RepairReport]) -> None:
+def test_the_summary_lists_the_faults(repaired: tuple[House, RepairReport]) -> None:
     text = summary_of_report(repaired[1])
     assert "1 person or plant taken out." in text
     assert "2 floors and 2 ceilings had no thickness" in text

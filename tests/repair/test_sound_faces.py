@@ -1,4 +1,4 @@
-"""Faces against their shading normals are turned, unless that opens a closed mesh."""
+"""Faces opposite to their shading normals are flipped, unless that opens a closed mesh."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def test_single_faces_of_a_closed_mesh_stay(is_closed: bool) -> None:
     assert surface.normals is not None
     if not is_closed:
         surface = replace(surface, faces=surface.faces[1:])
-    # Turn the normals round at the corners of one face, as smooth normals of sharp meshes may be.
+    # Reverse the normals at the corners of one face, like smooth normals of sharp meshes.
     normals = surface.normals.copy()
     normals[surface.faces[3]] *= -1
     after = repaired(replace(surface, normals=normals))

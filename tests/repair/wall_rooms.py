@@ -20,7 +20,7 @@ Rect = tuple[float, float, float, float]
 
 
 def house(items: Sequence[Item], rooms: Sequence[Room]) -> House:
-    """A House of those items and rooms, on levels as the rooms name them."""
+    """A House of those items and rooms, on the levels in the rooms' ids."""
     levels = {
         r.level_id: Level(r.level_id, r.level_id, r.floor_y, r.ceiling_y - r.floor_y) for r in rooms
     }
@@ -44,11 +44,11 @@ def room(room_id: str, rect: Rect, *, floor_y: float = 0.0, ceiling_y: float = H
 def covers(of: Room, *, floor: bool = True, ceiling: bool = True) -> list[Item]:
     """The planar floor and ceiling of a room."""
     items = []
-    for kind, y, material, wanted in (
+    for kind, y, material, is_wanted in (
         (ItemKind.FLOOR, of.floor_y, FLOOR, floor),
         (ItemKind.CEILING, of.ceiling_y, CEILING, ceiling),
     ):
-        if wanted:
+        if is_wanted:
             up = kind is ItemKind.FLOOR
             surface = horizontal(str(kind), [[of.polygon]], y, material, up=up)
             items.append(Item(f"{kind}_{of.id}", "", kind, of.level_id, (surface,), room_id=of.id))
@@ -81,40 +81,40 @@ def walls_around(rect: Rect, prefix: str = "w", **more: float) -> list[Item]:
     t = more.get("thickness", 0.2)
     h = 0.5 * t
     corners = [(x0 - h, z0 - h), (x1 + h, z0 - h), (x1 + h, z1 + h), (x0 - h, z1 + h)]
-    found = []
+    items = []
     for k in range(4):
         (ax, az), (bx, bz) = corners[k], corners[(k + 1) % 4]
         ux, uz = np.sign(bx - ax), np.sign(bz - az)
-        found.append(
+        items.append(
             wall(f"{prefix}{k}", (ax - h * ux, az - h * uz), (bx + h * ux, bz + h * uz), **more)
         )
-    return found  # fmt: skip
+    return items  # fmt: skip
 
 
 def mitred_walls(rect: Rect, *, thickness: float = 0.2, top: float = HEIGHT_M) -> list[Item]:
-    """Four walls around the rectangle that meet in their corners' diagonals and share nothing."""
+    """Four mitred walls around the rectangle, which meet in the corners' diagonals without overlap."""
     x0, z0, x1, z1 = rect
     inner = _outline(rect)
     outer = _outline((x0 - thickness, z0 - thickness, x1 + thickness, z1 + thickness))
-    found = []
+    items = []
     for k in range(4):
         ends, tops = [(k + 1) % 4, k], np.full(2, top)
         surfaces = wall_prism(inner[ends], outer[ends], 0.0, tops, tops, (WALL,) * 3)
-        found.append(Item(f"m{k}", f"m{k}", ItemKind.WALL, "0", surfaces, nyu40=1))
-    return found
+        items.append(Item(f"m{k}", f"m{k}", ItemKind.WALL, "0", surfaces, nyu40=1))
+    return items
 
 
 def planar_walls(rect: Rect, *, top: float = HEIGHT_M) -> list[Item]:
-    """Four walls without thickness on the rectangle's edges, fronts into the room."""
+    """Four walls of zero thickness on the rectangle's edges, facing into the room."""
     outline = _outline(rect)
-    found = []
+    items = []
     for k in range(4):
         a, b = outline[k], outline[(k + 1) % 4]
-        # Counter-clockwise in plan (x right, z up) the room lies to the left.
+        # Counter-clockwise in plan (x right, z up) the room is to the left.
         quad = np.array([[a[0], 0, a[1]], [b[0], 0, b[1]], [b[0], top, b[1]], [a[0], top, a[1]]])
         surface = quads_surface("plane", quad[None], WALL)
-        found.append(Item(f"p{k}", f"p{k}", ItemKind.WALL, "0", (surface,), nyu40=1))
-    return found
+        items.append(Item(f"p{k}", f"p{k}", ItemKind.WALL, "0", (surface,), nyu40=1))
+    return items
 
 
 def turned(source: House, angle_rad: float) -> House:

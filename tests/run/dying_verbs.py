@@ -11,7 +11,7 @@ from pbrs_farm.crash_notes import note_step
 
 
 def main(words: Sequence[str]) -> int:
-    """`end CODE`; `die SIGNAL FILE STEP ...`: killed by it after the last of the steps."""
+    """`end CODE`; `die SIGNAL FILE STEP ...`: killed by the signal after the last step."""
     if words[0] == "end":
         sys.stdout.write("done\n")
         return int(words[1])

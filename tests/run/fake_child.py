@@ -1,4 +1,4 @@
-"""A render process that says what a test scripts, on a clock that only moves when it is waited for."""
+"""A scripted render process, on a clock that advances only when it is waited for."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from pbrs_farm.run.processes.child_process import Message, MessageKind
 
 @dataclass
 class FakeClock:
-    """Seconds that pass only when somebody waits."""
+    """A clock that advances only in waits."""
 
     now: float = 0.0
 
@@ -36,7 +36,7 @@ class FakeChild:
     def at(
         self, seconds: float, what: MessageKind | Callable[[], None], text: str = "", **body: Any
     ) -> None:
-        """Say something, or have something happen, at that time of the clock."""
+        """Send a message, or call a function, at that time of the clock."""
         self.script.append((seconds, Message(what, text, body) if isinstance(what, str) else what))
 
     def dies(self, code: int) -> None:
@@ -48,11 +48,11 @@ class FakeChild:
     def receive(self, timeout_s: float) -> bytes | None:
         until = self.clock.now + timeout_s
         while self.script and self.script[0][0] <= until and self.code is None:
-            at, what = self.script.popleft()
-            self.clock.now = max(self.clock.now, at)
-            if isinstance(what, Message):
-                return what.line()
-            what()
+            time, event = self.script.popleft()
+            self.clock.now = max(self.clock.now, time)
+            if isinstance(event, Message):
+                return event.line()
+            event()
         self.clock.now = until
         return None
 

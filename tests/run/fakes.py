@@ -1,4 +1,4 @@
-"""Steps that do as a test says: the house's "source" location names what goes wrong."""
+"""Fake steps: the house's "source" location names their fault."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ SPOILT = {
     "taken_out": {"plant": 2, "person": 1},
     "walls_lost": ["w3: repair left 0.5 of 24.0 m2 of it"],
 }
-"""Facts of a house that lost something."""
+"""Facts of a house with losses."""
 
 
 def run_step(name: str, work: Work, *, attempt: int = 1) -> Outcome:
-    """A step that writes its own name, unless the recipe's name says otherwise for it."""
+    """A step that writes its name, unless the recipe's name gives it another behaviour."""
     return run_unless_done(name, work, lambda w: _make(name, w), attempt=attempt)
 
 
 def _make(name: str, work: Work) -> StepOutput:
     word, _, place = work.recipe.name.partition(":")
-    where, _, home = place.partition("@")  # of any house, or of one whose id begins so
-    at = f"{name}.{work.view_id}" if STEPS[name].per_view else name
-    if where in (at, name) and work.house_id.startswith(home):
+    where, _, home = place.partition("@")  # for any house, or for those whose id starts so
+    key = f"{name}.{work.view_id}" if STEPS[name].per_view else name
+    if where in (key, name) and work.house_id.startswith(home):
         if word == "crash":
             os.kill(os.getpid(), signal.SIGSEGV)
         if word == "hang":
@@ -47,4 +47,4 @@ def _make(name: str, work: Work) -> StepOutput:
         return StepOutput({f"{name}.txt": b""}, dict(SPOILT))
     facts: dict[str, object] = {"dark": ["black"]} if name == "light" and word == "black" else {}
     facts |= {"views": [["0_0_0", "0_0", 2.0], ["0_0_1", "0_0", 1.0]]} if name == "cameras" else {}
-    return StepOutput({f"{name}.txt": at.encode()}, facts)
+    return StepOutput({f"{name}.txt": key.encode()}, facts)

@@ -1,4 +1,4 @@
-"""Blur moves with a walk's frames, else as the recipe says; focus is on what the middle shows."""
+"""Blur follows a walk's frames, else the recipe; focus is on the middle of the picture."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_a_frame_moves_as_between_its_neighbours() -> None:
     assert np.allclose(blur.turn_rad, (0, 0.01, 0))
 
 
-def test_a_single_view_moves_as_the_recipe_says_in_its_own_axes() -> None:
+def test_a_single_view_moves_by_the_recipe_in_its_local_axes() -> None:
     view = frame(None, 0.0, np.pi / 2)
     fields = BlurFields(shutter_s=0.1, right_mps=1.0, pan_dps=90.0)
     blur = blur_of(view, fields)
@@ -69,7 +69,7 @@ def test_a_recipe_without_a_rolling_shutter_keeps_its_digest() -> None:
     assert digest(shutter_s="0.01") != digest(shutter_s="0.01", rolling_s="0.02")
 
 
-def test_focus_is_on_what_the_middle_shows() -> None:
+def test_focus_is_on_the_middle_of_the_picture() -> None:
     view = frame(None, 0.0)
     blur = blur_of(view, BlurFields(aperture_mm=20))
     assert (blur.aperture_radius_m, blur.focus_m) == (0.01, 3.5)

@@ -1,4 +1,4 @@
-"""The step develop by itself: what earlier frames ask of a picture's exposure."""
+"""The step develop in isolation: exposure from earlier frames."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ PANORAMA = {"lens.model": "equirect", "image.width_px": "64", "image.height_px":
 
 
 def noisy_aovs(height: int, width: int) -> LinearAovs:
-    """Light that is brighter on one side, noisy, from surfaces that face the eye."""
+    """Noisy light, brighter on one side, from surfaces that face the eye."""
     rng = np.random.default_rng(2)
     side = 0.5 + 0.4 * np.sin(np.arange(width) / width * 2 * np.pi)
     light = side[None, :, None] * rng.gamma(0.3, 1 / 0.3, (height, width, 1)).repeat(3, -1)
@@ -38,7 +38,7 @@ def noisy_aovs(height: int, width: int) -> LinearAovs:
 def test_a_panorama_is_exposed_alike_wherever_earlier_frames_are_cut(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
-    """The edges of an earlier frame are no borders to the denoiser that tells its exposure."""
+    """The edges of an earlier frame are no borders for the denoiser that computes its exposure."""
     camera = Camera(Intrinsics(64, 32, 30.0, 30.0, 32.0, 16.0), np.eye(4))
     views = {n: View(n, "r", 0, camera, time_s=t) for n, t in (("before", 0.0), ("now", 0.3))}
     store, aovs = MemoryStore(), noisy_aovs(32, 64)
@@ -54,8 +54,8 @@ def test_a_panorama_is_exposed_alike_wherever_earlier_frames_are_cut(
             store, recipe_from_name("fast", LAG | lens), "home", HouseCache(), view_id="now"
         )
         setup = ViewSetup(cast(CachedHouse, None), views["now"], views)
-        found = develop_step.develop_step(work, lambda: setup)
-        return float(found.facts["mlt_ol"]["exposure"])
+        outcome = develop_step.develop_step(work, lambda: setup)
+        return float(outcome.facts["mlt_ol"]["exposure"])
 
     def spread(lens: dict[str, str]) -> float:
         return float(np.ptp(np.log([exposure(lens, shift) for shift in range(0, 32, 8)])))

@@ -1,4 +1,4 @@
-"""Dressed variants of a home: ids, digests, what is stored and what is refused."""
+"""Dressed variants of a home: ids, digests, stored files, refused input."""
 
 from __future__ import annotations
 
@@ -35,17 +35,17 @@ def credit(name: str, licence: str, n: int = 1) -> Credit:
     ("text", "seeds"),
     [("3", (3,)), ("1..4", (1, 2, 3, 4)), ("5,2,5", (5, 2)), ("1..2,9", (1, 2, 9)), (None, ())],
 )
-def test_seeds_are_read_as_they_are_written(text, seeds):
+def test_seeds_are_read_in_their_written_form(text, seeds):
     assert dress_seeds(text) == seeds
 
 
 @pytest.mark.parametrize("text", ["", "x", "1..", "0", "-1", "4..2", "1.5", "1..999999", "٣"])
-def test_a_seed_that_is_no_number_is_one_clear_line(text):
+def test_a_seed_that_is_no_number_is_refused_in_one_line(text):
     with pytest.raises(BadInput, match="--dress"):
         dress_seeds(text)
 
 
-def test_a_variant_is_a_house_of_its_own_and_knows_its_home():
+def test_a_variant_is_a_separate_house_and_names_its_home():
     source = resolve("builtin")
     bare, first, third = variants(source, [0, 1, 3])
     assert bare == source
@@ -59,7 +59,7 @@ def test_an_object_without_context_is_never_dressed():
     assert variants(source, [1, 2]) == [source]
 
 
-def test_what_dresses_a_home_is_in_the_digest_of_a_recipe():
+def test_fields_of_dressing_are_in_the_digest_of_a_recipe():
     recipe = recipe_from_name("paper")
     assert "dress" in picture_groups()
     dressed = recipe_from_name("paper", {"dress.seed": "3"})
@@ -73,7 +73,7 @@ def test_a_share_outside_0_to_1_is_refused(value):
 
 
 @pytest.mark.long
-def test_the_house_step_writes_what_dressing_did_beside_what_repair_did():
+def test_the_house_step_writes_the_reports_of_dressing_and_repair():
     store = MemoryStore()
     recipe = recipe_from_name("preview", GENERATED | FEW)
     (source,) = variants(resolve("builtin"), [2])
@@ -83,7 +83,7 @@ def test_the_house_step_writes_what_dressing_did_beside_what_repair_did():
     assert (report.house_id, report.seed) == (source.house_id, 2)
     house = json.loads(store.get(keys.house_key(source.house_id, "house.json")))
     assert house["id"] == source.house_id
-    # Another share of anything is another house.
+    # Another value of any share is another house.
     again = recipe_from_name("preview", GENERATED | FEW | {"dress.walls": "0.5"})
     assert run_step("house", work).was_done
     assert not run_step("house", Work(store, again, work.house_id, HouseCache(), source)).was_done
@@ -96,7 +96,7 @@ def test_a_bare_house_has_no_report_of_dressing():
     assert store.head(keys.house_key(source.house_id, keys.DRESS)) is None
 
 
-def test_what_is_free_needs_no_attribution_and_what_is_not_is_named_once():
+def test_free_pictures_need_no_attribution_and_others_are_named_once():
     assert attribution_text(["home by A"], [credit("chair", "CC0")]) == ""
     text = attribution_text(
         ["home by A", "home by A"],
@@ -108,7 +108,7 @@ def test_what_is_free_needs_no_attribution_and_what_is_not_is_named_once():
 
 
 def _dressed(store: MemoryStore, house: str, *names: str) -> None:
-    """Put a dressed house's report and its row into a root's manifest."""
+    """Put a dressed house's report and its manifest row into a root."""
     report = DressReport(
         house_id=house, seed=1, credits=tuple(credit(n, "CC-BY 3.0") for n in names)
     )
@@ -143,7 +143,7 @@ def test_a_house_that_comes_in_while_the_attribution_is_written_is_not_forgotten
     assert "lamp" in store.get(keys.ATTRIBUTION).decode()
 
 
-def test_the_report_tells_in_plain_words_what_came_in_and_which_gate_broke():
+def test_the_report_lists_additions_and_broken_gates_in_plain_words():
     report = DressReport(
         house_id="home-d1", seed=1, style="nordic", added={"walls: picture": 3, "clutter: cup": 5},
         refused={"clutter: no room": 2}, changed={"parts": 4},
@@ -171,21 +171,21 @@ def test_the_verb_writes_the_bundle_the_report_and_a_picture(tmp_path: Path, cap
     assert "dressed by seed 2" in capsys.readouterr().out
 
 
-def test_an_unknown_style_is_one_line_that_names_those_there_are(tmp_path: Path, capsys):
+def test_an_unknown_style_is_refused_with_the_known_ones(tmp_path: Path, capsys):
     words = ["dress", "builtin", "--out", str(tmp_path), "--catalogue", "generated"]
     assert main([*words, "--set", "dress.style=baroque"]) == 1
-    told = capsys.readouterr().err
-    assert told.count("\n") == 1
-    assert "nordic" in told
+    message = capsys.readouterr().err
+    assert message.count("\n") == 1
+    assert "nordic" in message
 
 
-def test_an_unknown_catalogue_is_one_line(tmp_path: Path, capsys):
+def test_an_unknown_catalogue_is_refused_in_one_line(tmp_path: Path, capsys):
     words = ["dress", "builtin", "--out", str(tmp_path / "out")]
     assert main([*words, "--catalogue", f"generated:{tmp_path}/none.sh3f"]) == 1
     assert capsys.readouterr().err.count("\n") == 1
 
 
 @pytest.mark.parametrize("seed", ["x", "0", "1..3"])
-def test_the_verb_refuses_what_is_no_seed_in_one_line(seed, tmp_path: Path, capsys):
+def test_the_verb_refuses_an_invalid_seed_in_one_line(seed, tmp_path: Path, capsys):
     assert main(["dress", "builtin", "--seed", seed, "--out", str(tmp_path)]) == 1
     assert capsys.readouterr().err.count("\n") == 1

@@ -1,4 +1,4 @@
-"""The house a process keeps: what is read again, and what is not."""
+"""The house cached by a process: when it is read again."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ from pbrs_farm.store import MemoryStore
 
 
 class CountingStore(MemoryStore):
-    """A store in memory that counts how often each object is read."""
+    """A store in memory that counts the reads of each object."""
 
     def __init__(self) -> None:
         super().__init__()

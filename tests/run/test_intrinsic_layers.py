@@ -1,4 +1,4 @@
-"""Shading and residual are asked for by --layers: what goes with them, what they cost, where they are refused."""
+"""Shading and residual are requested by --layers: dependent layers, cost, refusals."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_layers_of_light_are_added_to_a_view_and_stay(tmp_path):
     (view,) = tmp_path.glob("houses/*/views/*")
     plain = {name: (view / name).read_bytes() for name in ("radiance.exr", "depth.png")}
     assert not any(n.startswith("diffuse_") for n in layers_from_exr(plain["radiance.exr"]))
-    # Light is split by another render; labels are added to; house and cameras stay.
+    # The light is rendered again; labels are added; house and cameras stay.
     added = run(tmp_path, "residual")
     assert added.n_done == 4
     assert (view / "depth.png").read_bytes() == plain["depth.png"]
@@ -64,7 +64,7 @@ def test_layers_of_light_are_added_to_a_view_and_stay(tmp_path):
     albedo = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
     total = albedo[..., 1] * shading["G"] + residual["G"]
     assert (total > -0.01 * total.max()).all()
-    # A run without them renders nothing; one with more splits no light again.
+    # A run without them renders nothing; one with other layers does not split light again.
     assert run(tmp_path).n_done == 0
     before = (view / "radiance.exr").read_bytes()
     assert run(tmp_path, "shading_indoor").n_done == 2

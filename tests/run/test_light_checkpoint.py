@@ -1,4 +1,4 @@
-"""What a view's light keeps beside the view, when, and when it goes."""
+"""Checkpoints of a view's light: contents, timing, removal."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ KEY = keys.unfinished_key("h", "light", "0_0_0")
 
 
 class Clock:
-    """Seconds as the test says."""
+    """A clock set by the test."""
 
     now = 100.0
 
@@ -47,7 +47,7 @@ def state(value: float) -> Callable[[], dict[str, Any]]:
 
 
 def kept_store() -> MemoryStore:
-    """A store in which a render has kept two parts after 61 seconds."""
+    """A store in which a render has stored two parts after 61 seconds."""
     store, clock = MemoryStore(), Clock()
     under_way = checkpoint(store, clock)
     under_way.keep("direct", 0.1, state(1))
@@ -72,7 +72,7 @@ def test_all_parts_are_kept_once_a_minute_has_passed() -> None:
     assert float(again.kept("direct")["film"][0, 0]) == 1
     assert int(again.kept("chains")["spp"]) == 2
     assert again.kept("path") == {}
-    # A part that was finished before the process died is kept with the others again.
+    # A part finished before the process died is stored with the others again.
     clock.now += 61
     again.keep("chains", 0.9, state(3))
     third = checkpoint(store, clock)
@@ -80,20 +80,20 @@ def test_all_parts_are_kept_once_a_minute_has_passed() -> None:
     assert (int(third.kept("direct")["spp"]), int(third.kept("chains")["spp"])) == (1, 3)
 
 
-def test_what_another_step_kept_is_not_gone_on_from() -> None:
-    other = checkpoint(kept_store(), Clock(), digest="e")
-    assert other.kept("chains") == {}
-    assert other.spent_s == 0
+def test_a_checkpoint_of_another_step_is_not_resumed() -> None:
+    foreign = checkpoint(kept_store(), Clock(), digest="e")
+    assert foreign.kept("chains") == {}
+    assert foreign.spent_s == 0
 
 
 @pytest.mark.parametrize("data", [b"", b"not a file", b"PK\x03\x04 cut off"])
-def test_a_damaged_file_is_none(data: bytes) -> None:
+def test_a_damaged_checkpoint_is_ignored(data: bytes) -> None:
     store = MemoryStore()
     store.put(KEY, data)
     assert checkpoint(store, Clock()).kept("chains") == {}
 
 
-def test_a_full_store_costs_what_was_to_be_kept_and_not_the_render() -> None:
+def test_a_full_store_costs_the_checkpoint_but_not_the_render() -> None:
     class Full(MemoryStore):
         def put(self, key: str, data: bytes | memoryview) -> None:
             raise StoreUnavailable(key, "is full")
@@ -105,18 +105,20 @@ def test_a_full_store_costs_what_was_to_be_kept_and_not_the_render() -> None:
     assert list(store.list()) == []
 
 
-def test_the_share_is_told_every_few_seconds() -> None:
-    clock, told = Clock(), list[float]()
-    under_way = checkpoint(MemoryStore(), clock, told=told)
+def test_progress_is_reported_every_few_seconds() -> None:
+    clock, reports = Clock(), list[float]()
+    under_way = checkpoint(MemoryStore(), clock, told=reports)
     for share in (0.1, 0.2, 0.3, 0.4):
         clock.now += 3
         under_way.keep("path", share, state(1))
-    assert told == [0.2, 0.4]
+    assert reports == [0.2, 0.4]
 
 
 @pytest.mark.long
 @pytest.mark.skipif(choose_variant().startswith("scalar"), reason="needs LLVM or CUDA")
-def test_a_killed_view_goes_on_and_leaves_nothing_behind(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_killed_view_is_resumed_and_leaves_nothing_behind(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     fields = {"image.width_px": "32", "image.height_px": "24", "cameras.cell_m": "1.0"}
     fields |= {"cameras.score_width_px": "64", "cameras.score_height_px": "48"}
     fields |= {"light.spp": "2", "light.noise": "0.01", "light.max_spp": "8"}
@@ -130,14 +132,14 @@ def test_a_killed_view_goes_on_and_leaves_nothing_behind(monkeypatch: pytest.Mon
     store = work.store
     store.delete(keys.marker_key(work.house_id, "light", view))
 
-    # Kill the render where it tells its share for the third time, each time right after a write.
+    # Kill the render at its third report of progress, each right after a write.
     monkeypatch.setattr("pbrs_farm.run.light_checkpoint.KEEP_EVERY_S", 0.0)
     monkeypatch.setattr("pbrs_farm.run.light_checkpoint.TELL_EVERY_S", 0.0)
-    told: list[float] = []
+    reports: list[float] = []
 
     def tell(share: float) -> None:
-        told.append(share)
-        if len(told) == 3:
+        reports.append(share)
+        if len(reports) == 3:
             raise KeyboardInterrupt
 
     with pytest.raises(KeyboardInterrupt):
@@ -145,15 +147,15 @@ def test_a_killed_view_goes_on_and_leaves_nothing_behind(monkeypatch: pytest.Mon
     unfinished = keys.unfinished_key(work.house_id, "light", view)
     assert store.head(unfinished) is not None
 
-    # Two of four launches are there: two are left, and then nothing is.
-    left: list[float] = []
-    again = run_step("light", replace(undisturbed, tell_share=left.append)).marker
-    assert len(left) == 2
+    # Two of four launches are stored: two remain, then none.
+    remaining: list[float] = []
+    again = run_step("light", replace(undisturbed, tell_share=remaining.append)).marker
+    assert len(remaining) == 2
     assert again.files == whole.files
     assert store.head(unfinished) is None
 
 
-def test_what_a_done_step_left_behind_goes_with_the_houses_end() -> None:
+def test_checkpoints_of_done_steps_are_removed_at_the_houses_end() -> None:
     store = kept_store()
     finish_house(store, "h")
     assert store.head(KEY) is not None

@@ -20,11 +20,12 @@ def test_memory_is_the_containers_when_it_has_a_limit(tmp_path: Path) -> None:
 
 
 def test_memory_that_was_freed_is_given_back() -> None:
-    # Pieces too small to be mapped one by one, and one in twenty kept: nothing shrinks by itself.
+    # Pieces too small to be mapped separately, of which one in twenty is kept: memory does not
+    # shrink unaided.
     pieces = [np.ones(8_000) for _ in range(2_000)]
-    kept = pieces[1::20]
+    survivors = pieces[1::20]
     before = resident_mb(os.getpid())
     del pieces
     give_back_memory()
     assert resident_mb(os.getpid()) < before - 60
-    assert all(piece[0] == 1 for piece in kept)
+    assert all(piece[0] == 1 for piece in survivors)

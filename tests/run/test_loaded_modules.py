@@ -1,4 +1,4 @@
-"""What a process of light has loaded before it has a task."""
+"""Modules that a light process loads before its first task."""
 
 import subprocess
 import sys
@@ -6,8 +6,8 @@ from pathlib import Path
 
 import pytest
 
-# What is done in a process of its own: a house and its cameras; then, in one that is ready for light,
-# light, and it prints what that loads beside.
+# A separate process makes a house and its cameras; then one prepared for light renders
+# light, and prints the modules that this loads in addition.
 _BEGIN = """
 import sys
 from pathlib import Path
@@ -39,8 +39,8 @@ print(*sorted(m for m in set(sys.modules) - before if m.startswith("pbrs_farm"))
 def test_light_waits_for_no_module_of_ours(tmp_path: Path) -> None:
     pytest.importorskip("mitsuba")
 
-    def said(code: str, *words: str) -> str:
+    def output_of(code: str, *words: str) -> str:
         command = [sys.executable, "-c", _BEGIN + code, str(tmp_path), *words]
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
 
-    assert said(_LIGHT, said(_HOUSE)) == ""
+    assert output_of(_LIGHT, output_of(_HOUSE)) == ""

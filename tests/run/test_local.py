@@ -1,4 +1,4 @@
-"""A local run: what is stored is kept, what fails costs its step only."""
+"""A local run: stored outputs are kept, and a failure costs only its step."""
 
 from __future__ import annotations
 
@@ -30,7 +30,7 @@ def fake_steps(monkeypatch: pytest.MonkeyPatch) -> None:
         return replace(Setting(*args), runner=FAKE)  # type: ignore[arg-type]
 
     monkeypatch.setattr(local, "Setting", setting)
-    # Fake steps need no library before they begin.
+    # Fake steps need no library.
     for role in pool.HANDLERS:
         monkeypatch.setitem(pool.HANDLERS, role, pool.HANDLERS[pool.ALONE])
 
@@ -53,7 +53,7 @@ def test_a_second_run_does_nothing(tmp_path: Path) -> None:
     assert (second.n_done, second.n_kept, second.failures) == (0, N_STEPS, [])
 
 
-def test_one_removed_marker_is_one_step_done_again(tmp_path: Path) -> None:
+def test_one_removed_marker_repeats_one_step(tmp_path: Path) -> None:
     run(tmp_path)
     next(tmp_path.glob("houses/*/done/opengl_dl.0_0_1.json")).unlink()
     assert run(tmp_path).n_done == 1
@@ -61,13 +61,13 @@ def test_one_removed_marker_is_one_step_done_again(tmp_path: Path) -> None:
 
 def test_a_crash_costs_one_step_and_names_the_command(tmp_path: Path) -> None:
     summary = run(tmp_path, "crash:opengl_il.0_0_0")
-    assert [what.split("/")[1:] for what, _m, _c in summary.failures] == [["0_0_0", "opengl_il"]]
+    assert [place.split("/")[1:] for place, _m, _c in summary.failures] == [["0_0_0", "opengl_il"]]
     assert "SIGSEGV" in summary.failures[0][1]
     assert summary.failures[0][2].startswith("pbrs-farm step opengl_il builtin --out")
     assert summary.n_done == N_STEPS - 1
 
 
-def test_a_failed_step_leaves_out_only_what_reads_it(tmp_path: Path) -> None:
+def test_a_failed_step_skips_only_its_dependents(tmp_path: Path) -> None:
     summary = run(tmp_path, "refuse:light.0_0_1")
     assert len(summary.failures) == 1
     assert "wall w3: is made of cheese" in summary.failures[0][1]
@@ -76,41 +76,41 @@ def test_a_failed_step_leaves_out_only_what_reads_it(tmp_path: Path) -> None:
     assert summary.n_done == N_STEPS - len(missing)
 
 
-def test_opengl_that_the_machine_lacks_is_left_out_and_told_once(
+def test_missing_opengl_is_skipped_with_one_message(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(making, "recipe_of", lambda _args: named("bare:opengl_dl"))
     assert main(["run", "builtin", "--out", str(tmp_path / "all")]) == 0
-    told = capsys.readouterr()
-    assert told.err.count("opengl_dl left out: no OpenGL here (install it)") == 1
-    assert "0 failed" in told.out
-    made = markers(tmp_path / "all")
-    assert not [m for m in made if m.startswith("opengl_dl")]
-    assert {"light.0_0_0", "opengl_il.0_0_0", "view.0_0_0", "view.0_0_1"} <= made
-    # Where nothing else was asked for it is a fault.
+    output = capsys.readouterr()
+    assert output.err.count("opengl_dl left out: no OpenGL here (install it)") == 1
+    assert "0 failed" in output.out
+    steps = markers(tmp_path / "all")
+    assert not [m for m in steps if m.startswith("opengl_dl")]
+    assert {"light.0_0_0", "opengl_il.0_0_0", "view.0_0_0", "view.0_0_1"} <= steps
+    # If nothing else was requested it is a fault.
     assert main(["run", "builtin", "--out", str(tmp_path / "gl"), "--modes", "opengl_dl"]) == 1
     assert "FAILED: no OpenGL here" in capsys.readouterr().err
 
 
-def test_illuminance_that_fails_is_told_once_and_costs_the_light_of_every_view(
+def test_failed_illuminance_is_reported_once_and_costs_the_light_of_every_view(
     tmp_path: Path,
 ) -> None:
     summary = run(tmp_path, "refuse:illuminance")
-    assert [what.split("/")[1] for what, _m, _c in summary.failures] == ["illuminance"]
+    assert [place.split("/")[1] for place, _m, _c in summary.failures] == ["illuminance"]
     done = {"house", "cameras"}
     for view in ("0_0_0", "0_0_1"):
         done |= {f"{step}.{view}" for step in ("truth", "opengl_dl", "opengl_il", "view")}
     assert markers(tmp_path) == done
 
 
-def test_illuminance_is_done_where_light_is_wanted(tmp_path: Path) -> None:
+def test_illuminance_is_computed_if_light_is_requested(tmp_path: Path) -> None:
     run(tmp_path, want=wanted(["opengl_dl"], []))
     assert "illuminance" not in markers(tmp_path)
     run(tmp_path, want=wanted(["mlt_ol"], []))
     assert "illuminance" in markers(tmp_path)
 
 
-def test_views_of_a_room_measured_dark_are_left_out_and_told(tmp_path: Path) -> None:
+def test_views_of_a_room_measured_dark_are_skipped_and_reported(tmp_path: Path) -> None:
     summary = run(tmp_path, "dark")
     assert summary.n_views == 0
     assert "truth.0_0_0" not in markers(tmp_path)
@@ -121,7 +121,7 @@ def test_views_of_a_room_measured_dark_are_left_out_and_told(tmp_path: Path) -> 
 
 @pytest.mark.quick(1)
 @pytest.mark.parametrize("fields", [{"selection.min_room_lx": "0"}, {"cameras.source": "stored"}])
-def test_views_of_a_dark_room_are_made_where_the_recipe_or_the_user_asks_for_them(
+def test_views_of_a_dark_room_are_made_if_the_recipe_or_the_user_requests_them(
     tmp_path: Path, fields: dict[str, str]
 ) -> None:
     recipe = recipe_from_name("preview", fields).model_copy(update={"name": "dark"})
@@ -129,31 +129,29 @@ def test_views_of_a_dark_room_are_made_where_the_recipe_or_the_user_asks_for_the
     assert (summary.n_views, summary.left_out) == (2, [])
 
 
-def test_a_view_that_came_out_black_is_told(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str]
-) -> None:
+def test_a_black_view_is_reported(tmp_path: Path, capsys: pytest.CaptureFixture[str]) -> None:
     summary = run(tmp_path, "black")
     assert [(v.split("/")[1], why) for v, why in summary.dark] == [
         ("0_0_0", "black"),
         ("0_0_1", "black"),
     ]
-    making._report(summary, 1.0, str(tmp_path), as_json=False)
+    making.print_summary(summary, 1.0, str(tmp_path), as_json=False)
     assert "0_0_1: dark: black" in capsys.readouterr().err
-    # A second run finds them done and tells it again.
+    # A second run finds them done and reports it again.
     assert len(run(tmp_path, "black").dark) == 2
 
 
-def test_leaks_notes_and_lost_walls_are_told_also_by_a_run_that_finds_them_done(
+def test_leaks_notes_and_lost_walls_are_reported_also_by_a_later_run(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     for _ in range(2):
-        making._report(run(tmp_path, "spoilt"), 1.0, str(tmp_path), as_json=False)
-        told = capsys.readouterr()
-        assert "LIGHT LEAKS IN: 833 of 20000 rays" in told.err
-        assert "WALL LOST: w3: repair left 0.5 of 24.0 m2 of it" in told.err
-        assert "2 views: 1 wall LOST, " in told.out
-        assert "1 person and 2 plants taken out: " in told.out
-        assert "4 notes (3 missing-texture, 1 wall-lost): `notes` in" in told.out.splitlines()[-1]
+        making.print_summary(run(tmp_path, "spoilt"), 1.0, str(tmp_path), as_json=False)
+        output = capsys.readouterr()
+        assert "LIGHT LEAKS IN: 833 of 20000 rays" in output.err
+        assert "WALL LOST: w3: repair left 0.5 of 24.0 m2 of it" in output.err
+        assert "2 views: 1 wall LOST, " in output.out
+        assert "1 person and 2 plants taken out: " in output.out
+        assert "4 notes (3 missing-texture, 1 wall-lost): `notes` in" in output.out.splitlines()[-1]
 
 
 @pytest.mark.quick(1)
@@ -179,7 +177,7 @@ def test_what_was_refused_before_the_run_is_one_of_its_failures(tmp_path: Path) 
     assert summary.n_views == 2
 
 
-def test_a_bug_is_told_by_its_type_and_the_run_goes_on(tmp_path: Path) -> None:
+def test_a_bug_is_reported_by_its_type_and_the_run_continues(tmp_path: Path) -> None:
     summary = run(tmp_path, "bug:truth.0_0_0")
     assert summary.failures[0][1] == "ZeroDivisionError: a bug"
     assert {"opengl_dl.0_0_1", "view.0_0_1"} <= markers(tmp_path)
@@ -211,16 +209,16 @@ def test_a_home_that_is_missing_does_not_stop_the_others(tmp_path: Path) -> None
 
 def test_another_recipe_is_refused_with_the_fields_that_differ(tmp_path: Path) -> None:
     run(tmp_path)
-    other = recipe_from_name("preview", {"tone.key": "0.3"})
+    other_recipe = recipe_from_name("preview", {"tone.key": "0.3"})
     with pytest.raises(BadRecipe, match=r"tone\.key: 0\.18 -> 0\.3"):
-        run_local(Run(["builtin"], str(tmp_path), other))
+        run_local(Run(["builtin"], str(tmp_path), other_recipe))
 
 
-def test_update_renders_again_what_differs(tmp_path: Path) -> None:
+def test_update_renders_changed_steps_again(tmp_path: Path) -> None:
     run(tmp_path)
-    other = recipe_from_name("preview", {"tone.key": "0.3"})
-    summary = run_local(Run(["builtin"], str(tmp_path), other, update=True))
-    assert summary.n_done == 4  # develop and view of both views
+    other_recipe = recipe_from_name("preview", {"tone.key": "0.3"})
+    summary = run_local(Run(["builtin"], str(tmp_path), other_recipe, update=True))
+    assert summary.n_done == 4  # develop and view for both views
     assert summary.n_kept == N_STEPS - 4
 
 
@@ -233,7 +231,7 @@ def test_the_manifest_lists_every_object_of_the_house(tmp_path: Path) -> None:
     assert len(listed) == N_STEPS
 
 
-def test_two_processes_make_what_one_makes(tmp_path: Path) -> None:
+def test_two_processes_give_the_output_of_one(tmp_path: Path) -> None:
     run(tmp_path / "one")
     run(tmp_path / "two", n_jobs=2)
     assert (tmp_path / "one/manifest.jsonl").read_bytes() == (
@@ -249,15 +247,15 @@ def two_cores(monkeypatch: pytest.MonkeyPatch) -> None:
 
 
 def makers(out: Path, step: str) -> set[str]:
-    """The processes that made a step of the houses or of the views, by their markers."""
-    found = [*out.glob(f"houses/*/done/{step}.*.json"), *out.glob(f"houses/*/done/{step}.json")]
-    return {json.loads(path.read_text())["worker"] for path in found}
+    """The processes that made a step of the houses or views, from their markers."""
+    files = [*out.glob(f"houses/*/done/{step}.*.json"), *out.glob(f"houses/*/done/{step}.json")]
+    return {json.loads(path.read_text())["worker"] for path in files}
 
 
 @pytest.mark.usefixtures("two_cores")
 def test_one_process_renders_light_while_another_finishes_the_views(tmp_path: Path) -> None:
-    seen: list[Event] = []
-    summary = run_local(Run(["builtin"], str(tmp_path), named("plain")), seen.append)
+    events: list[Event] = []
+    summary = run_local(Run(["builtin"], str(tmp_path), named("plain")), events.append)
     assert summary.n_done == N_STEPS
     (light,) = makers(tmp_path, "light")
     (develop,) = makers(tmp_path, "develop")
@@ -265,32 +263,32 @@ def test_one_process_renders_light_while_another_finishes_the_views(tmp_path: Pa
     assert makers(tmp_path, "truth") == makers(tmp_path, "cameras") == {develop}
     assert makers(tmp_path, "illuminance") == {light}
     # The house and each view end once, with all their steps.
-    ends = [event.view_id or "" for event in seen if event.kind == "end"]
+    ends = [event.view_id or "" for event in events if event.kind == "end"]
     assert sorted(ends) == ["", "0_0_0", "0_0_1"]
 
 
 @pytest.mark.usefixtures("two_cores")
-def test_several_houses_follow_one_another_through_both_processes(tmp_path: Path) -> None:
-    seen: list[Event] = []
+def test_several_houses_pass_through_both_processes_in_order(tmp_path: Path) -> None:
+    events: list[Event] = []
     homes = ["builtin", "made:1", "made:2", "made:3"]
-    summary = run_local(Run(homes, str(tmp_path), named("plain")), seen.append)
+    summary = run_local(Run(homes, str(tmp_path), named("plain")), events.append)
     assert (summary.n_done, summary.n_views, summary.failures) == (4 * N_STEPS, 8, [])
-    # A house's views are all known before the next house is begun.
-    kinds = [e.kind if e.kind == "planned" else e.step for e in seen if e.view_id is None]
-    told = [k for k in kinds if k in ("house", "planned")]
-    assert told == ["house", "house", "planned"] * 4  # begun, done, its views known
+    # All views of a house are known before the next house starts.
+    kinds = [e.kind if e.kind == "planned" else e.step for e in events if e.view_id is None]
+    order = [k for k in kinds if k in ("house", "planned")]
+    assert order == ["house", "house", "planned"] * 4  # started, done, its views known
 
 
 @pytest.mark.quick(1)
 @pytest.mark.usefixtures("two_cores")
 @pytest.mark.parametrize("wrong", ["refuse", "crash"])
-def test_a_house_that_fails_costs_itself_alone(tmp_path: Path, wrong: str) -> None:
+def test_a_failed_house_costs_only_itself(tmp_path: Path, wrong: str) -> None:
     homes = ["builtin", "made:1"]
     summary = run_local(Run(homes, str(tmp_path), named(f"{wrong}:house@builtin")))
-    ((what, _message, _command),) = summary.failures
-    assert what.startswith("builtin")
-    assert what.endswith("/house")
-    # The other one is whole.
+    ((place, _message, _command),) = summary.failures
+    assert place.startswith("builtin")
+    assert place.endswith("/house")
+    # The other view is complete.
     assert (summary.n_done, summary.n_views) == (N_STEPS, 2)
     assert not list(tmp_path.glob("houses/builtin*/done/*"))
 
@@ -298,17 +296,17 @@ def test_a_house_that_fails_costs_itself_alone(tmp_path: Path, wrong: str) -> No
 @pytest.mark.usefixtures("two_cores")
 def test_a_crash_of_cameras_costs_no_illuminance(tmp_path: Path) -> None:
     summary = run(tmp_path, "crash:cameras")
-    assert [what.split("/")[1] for what, _message, _command in summary.failures] == ["cameras"]
+    assert [place.split("/")[1] for place, _message, _command in summary.failures] == ["cameras"]
     assert markers(tmp_path) == {"house", "illuminance"}
 
 
 @pytest.mark.usefixtures("two_cores")
 def test_a_view_whose_light_crashes_is_finished_without_it(tmp_path: Path) -> None:
     summary = run(tmp_path, "crash:light.0_0_0")
-    ((what, message, _command),) = summary.failures
-    assert what.endswith("0_0_0/light")
+    ((place, message, _command),) = summary.failures
+    assert place.endswith("0_0_0/light")
     assert "SIGSEGV" in message
-    assert summary.n_done == N_STEPS - 2  # its light and what is developed from it
+    assert summary.n_done == N_STEPS - 2  # its light and the step developed from it
     assert {"truth.0_0_0", "view.0_0_0", "develop.0_0_1"} < markers(tmp_path)
     assert "develop.0_0_0" not in markers(tmp_path)
 
@@ -323,11 +321,11 @@ def test_a_view_whose_light_crashes_is_finished_without_it(tmp_path: Path) -> No
         ({}, 2, 4_000.0, False),
     ],
 )
-def test_views_are_finished_apart_where_one_job_leaves_cores_idle(
+def test_views_are_finished_in_another_process_if_one_job_leaves_cores_idle(
     fields: dict[str, object], cores: int, memory_mb: float, is_apart: bool,
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:  # fmt: skip
     monkeypatch.setattr(os, "cpu_count", lambda: cores)
     monkeypatch.setattr(limits, "machine_mb", lambda: memory_mb)
-    asked = Run(["builtin"], "somewhere", named("plain"), **fields)  # type: ignore[arg-type]
-    assert local.finishes_apart(asked) is is_apart
+    request = Run(["builtin"], "somewhere", named("plain"), **fields)  # type: ignore[arg-type]
+    assert local.finishes_apart(request) is is_apart

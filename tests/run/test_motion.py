@@ -1,4 +1,4 @@
-"""A walk in stereo through the small home, labels alone: what a run leaves, and what verify says of it."""
+"""A stereo walk through the small home with labels only: outputs of a run, and checks of verify."""
 
 from __future__ import annotations
 
@@ -36,33 +36,37 @@ FIELDS = {
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Summary]:
+def finished_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Summary]:
     out = tmp_path_factory.mktemp("out")
     want = wanted(["opengl_dl"], BETWEEN, pairs=True)
     return out, run_local(Run(["builtin"], str(out), recipe_from_name("preview", FIELDS), want))
 
 
 @pytest.fixture(scope="module")
-def certificate(made: tuple[Path, Summary]) -> Certificate:
-    return verify(made[0], all_pixels=True)
+def certificate(finished_run: tuple[Path, Summary]) -> Certificate:
+    return verify(finished_run[0], all_pixels=True)
 
 
 def house(root: Path) -> Path:
     return next(root.glob("houses/*"))
 
 
-def test_every_frame_has_both_pictures_and_nothing_fails(made: tuple[Path, Summary]) -> None:
-    assert made[1].failures == []
-    assert sorted(p.name for p in house(made[0]).glob("views/*")) == sorted(
+def test_every_frame_has_both_pictures_and_nothing_fails(
+    finished_run: tuple[Path, Summary],
+) -> None:
+    assert finished_run[1].failures == []
+    assert sorted(p.name for p in house(finished_run[0]).glob("views/*")) == sorted(
         f"frame_{k:05d}{side}" for k in range(4) for side in ("", "_right")
     )
 
 
-def test_the_first_frame_has_no_previous_and_the_last_no_next(made: tuple[Path, Summary]) -> None:
+def test_the_first_frame_has_no_previous_and_the_last_no_next(
+    finished_run: tuple[Path, Summary],
+) -> None:
     for name, lacking in (("frame_00000", "previous"), ("frame_00003_right", "next")):
-        view = house(made[0]) / "views" / name
-        there = {x.name for x in LAYERS if x.partner and (view / x.file).is_file()}
-        assert there == {x.name for x in LAYERS if x.partner and x.partner != lacking}
+        view = house(finished_run[0]) / "views" / name
+        layers = {x.name for x in LAYERS if x.partner and (view / x.file).is_file()}
+        assert layers == {x.name for x in LAYERS if x.partner and x.partner != lacking}
 
 
 def test_verify_finds_every_layer_between_views_right(certificate: Certificate) -> None:
@@ -74,12 +78,12 @@ def test_verify_finds_every_layer_between_views_right(certificate: Certificate) 
 
 
 def test_the_cameras_keep_frame_and_time_and_the_view_names_its_partners(
-    made: tuple[Path, Summary],
+    finished_run: tuple[Path, Summary],
 ) -> None:
-    file = house(made[0]) / "cameras.json"
+    file = house(finished_run[0]) / "cameras.json"
     views = views_from_json(file.read_bytes(), "cameras.json")
     assert (views["frame_00002"].frame, views["frame_00002"].time_s) == (2, 0.4)
-    table = json.loads((house(made[0]) / "views/frame_00002/view.json").read_text())
+    table = json.loads((house(finished_run[0]) / "views/frame_00002/view.json").read_text())
     assert table["frame"] == 2
     assert {k: v["view"] for k, v in table["partners"].items()} == {
         "next": "frame_00003",
@@ -88,26 +92,28 @@ def test_the_cameras_keep_frame_and_time_and_the_view_names_its_partners(
     }
 
 
-def test_flow_there_and_back_cancels_where_both_frames_see_a_point(
-    made: tuple[Path, Summary],
+def test_flow_there_and_back_cancels_at_points_seen_by_both_frames(
+    finished_run: tuple[Path, Summary],
 ) -> None:
     def layer(frame: int, name: str) -> np.ndarray:
-        file = house(made[0]) / f"views/frame_{frame:05d}" / LAYER[name].file
+        file = house(finished_run[0]) / f"views/frame_{frame:05d}" / LAYER[name].file
         return layer_from_bytes(name, file.read_bytes(), name)
 
-    there, back = layer(1, "flow_forward"), layer(2, "flow_backward")
-    seen = layer(1, "occlusion_forward") == 0
-    rows, columns = np.nonzero(seen)
-    x, y = columns + 0.5 + there[seen][:, 0], rows + 0.5 + there[seen][:, 1]
-    returned = back[np.floor(y).astype(int), np.floor(x).astype(int)] + there[seen]
-    # Neighbouring pixels differ at edges: nine of ten cancel.
+    forward, back = layer(1, "flow_forward"), layer(2, "flow_backward")
+    visible = layer(1, "occlusion_forward") == 0
+    rows, columns = np.nonzero(visible)
+    x, y = columns + 0.5 + forward[visible][:, 0], rows + 0.5 + forward[visible][:, 1]
+    returned = back[np.floor(y).astype(int), np.floor(x).astype(int)] + forward[visible]
+    # Neighbouring pixels differ at edges: nine of ten flows cancel.
     assert np.quantile(np.abs(returned).max(1), 0.9) < 0.5
 
 
 def test_pairs_are_those_of_each_room_and_a_stereo_pair_shares_nearly_all(
-    made: tuple[Path, Summary],
+    finished_run: tuple[Path, Summary],
 ) -> None:
-    rows = pairs_from_parquet((house(made[0]) / "pairs.parquet").read_bytes(), "pairs.parquet")
+    rows = pairs_from_parquet(
+        (house(finished_run[0]) / "pairs.parquet").read_bytes(), "pairs.parquet"
+    )
     assert len(rows) == 8 * 7 / 2
     stereo = next(
         r for r in rows if (r["view_a"], r["view_b"]) == ("frame_00000", "frame_00000_right")
@@ -117,16 +123,16 @@ def test_pairs_are_those_of_each_room_and_a_stereo_pair_shares_nearly_all(
 
 
 def test_verify_recomputes_pairs_and_finds_a_share_that_is_wrong(
-    certificate: Certificate, made: tuple[Path, Summary], tmp_path: Path
+    certificate: Certificate, finished_run: tuple[Path, Summary], tmp_path: Path
 ) -> None:
     assert certificate.counts["pairs"].checked > 50
     root = tmp_path / "root"
-    shutil.copytree(made[0], root)
+    shutil.copytree(finished_run[0], root)
     file = house(root) / "pairs.parquet"
     rows = pairs_from_parquet(file.read_bytes(), "pairs.parquet")
     file.write_bytes(pairs_parquet([row | {"a_in_b": row["a_in_b"] - 0.05} for row in rows]))
     sign(root, house(root))
-    # Of each row the share itself, and `common`, which is the mean of both.
+    # Two errors per row: the share, and `common`, which is the mean of both.
     assert verify(root, sample=10).counts["pairs"].failed == 2 * len(rows)
 
 
@@ -147,7 +153,8 @@ def test_verify_recomputes_pairs_through_any_lens(lens: dict[str, str], tmp_path
     want = wanted(["opengl_dl"], [], pairs=True)
     run_local(Run(["builtin"], str(tmp_path), recipe_from_name("preview", fields), want))
     pairs = verify(tmp_path, sample=10).counts["pairs"]
-    # Three pairs have two shares, their mean, room, baseline and angle each; names and number are two more.
+    # Three pairs have two shares, their mean, room, baseline and angle each; names and number are
+    # two more.
     assert (pairs.checked, pairs.failed) == (20, 0)
 
 
@@ -177,10 +184,10 @@ def _disparity_doubled(view: Path) -> None:
     ],
 )
 def test_verify_finds_damage_to_a_layer_between_views(
-    damage, check: str, made: tuple[Path, Summary], tmp_path: Path
+    damage, check: str, finished_run: tuple[Path, Summary], tmp_path: Path
 ) -> None:
     root = tmp_path / "root"
-    shutil.copytree(made[0], root)
+    shutil.copytree(finished_run[0], root)
     damage(house(root) / "views/frame_00001")
     sign(root, house(root))
     counts = verify(root, all_pixels=True).counts

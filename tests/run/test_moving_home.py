@@ -1,4 +1,4 @@
-"""A walk through the small home while its doors open: what is stored, and what verify says of it."""
+"""A walk through the small home while its doors open: stored files, and checks of verify."""
 
 from __future__ import annotations
 
@@ -35,15 +35,15 @@ def moving() -> pf.Home:
 
 
 @pytest.fixture(scope="module")
-def made(moving: pf.Home, tmp_path_factory: pytest.TempPathFactory) -> Path:
+def finished_run(moving: pf.Home, tmp_path_factory: pytest.TempPathFactory) -> Path:
     out = tmp_path_factory.mktemp("out")
     pf.render_homes(moving, out, modes=["opengl_dl"], layers=LAYERS, tracks=True)
     return out
 
 
 @pytest.fixture(scope="module")
-def certificate(made: Path) -> Certificate:
-    return verify(made, all_pixels=True)
+def certificate(finished_run: Path) -> Certificate:
+    return verify(finished_run, all_pixels=True)
 
 
 def view(root: Path, number: int) -> Path:
@@ -60,37 +60,41 @@ def test_every_pixel_and_every_table_is_right(certificate: Certificate) -> None:
     for name in ("flow_forward", "flow_backward", "occlusion_forward", "scene_flow"):
         assert certificate.counts[f"motion: {name}"].checked == 3 * 96 * 72
     assert certificate.counts["motions"].checked > 20
-    # Each point by where it lies and whether it is seen, in each frame.
+    # Each point is checked for its place and visibility in each frame.
     assert certificate.counts["tracks"].checked > 2 * 4 * 900
     assert certificate.counts["tracks"].ties <= 20
 
 
 @pytest.mark.long
-def test_each_view_tells_the_time_and_how_far_doors_are_open(made: Path, moving: pf.Home) -> None:
+def test_each_view_records_the_time_and_the_opening_of_doors(
+    finished_run: Path, moving: pf.Home
+) -> None:
     for number, share in enumerate((0.1, 0.4, 0.7, 1.0)):
-        told = table(made, number)
-        assert told["time_s"] == number / 4
-        values = {row["item"]: row["value"] for row in told["motion"]["joints"]}
+        facts = table(finished_run, number)
+        assert facts["time_s"] == number / 4
+        values = {row["item"]: row["value"] for row in facts["motion"]["joints"]}
         expected = {row["item"]: share * row["upper"] for row in moving.joints}
         assert values == pytest.approx(expected)
 
 
 @pytest.mark.long
-def test_a_door_that_is_seen_flows_and_its_frame_does_not(made: Path) -> None:
+def test_a_door_that_is_seen_flows_and_its_frame_does_not(finished_run: Path) -> None:
     moved = {
-        k: np.stack([layers_from_exr((view(made, k) / "scene_flow.exr").read_bytes())[c] for c in "XYZ"])
+        k: np.stack([layers_from_exr((view(finished_run, k) / "scene_flow.exr").read_bytes())[c] for c in "XYZ"])
         for k in range(3)
     }  # fmt: skip
     shares = [(np.abs(m).max(0) > 1e-3).mean() for m in moved.values()]
     assert max(shares) > 0.02
     assert min(shares) < 0.9
-    # A hinge is upright: nothing of a door goes up or down.
+    # A hinge is vertical: no part of a door moves up or down.
     assert max(np.abs(m[1]).max() for m in moved.values()) < 1e-6
 
 
 @pytest.mark.long
-def test_ids_of_instances_stay_over_time(made: Path) -> None:
-    names = [{row["id"]: row["item"] for row in table(made, k)["instances"]} for k in range(4)]
+def test_ids_of_instances_stay_over_time(finished_run: Path) -> None:
+    names = [
+        {row["id"]: row["item"] for row in table(finished_run, k)["instances"]} for k in range(4)
+    ]
     for a, b in pairwise(names):
         assert {k: a[k] for k in a.keys() & b.keys()} == {k: b[k] for k in a.keys() & b.keys()}
 
@@ -107,9 +111,9 @@ def shift(file: str, channel: str, by: float) -> Callable[[Path], None]:
 
 def change(file: Callable[[Path], Path], edit: Callable[[dict], None]) -> Callable[[Path], None]:
     def plant(root: Path) -> None:
-        held = json.loads(file(root).read_text())
-        edit(held)
-        file(root).write_text(json.dumps(held))
+        document = json.loads(file(root).read_text())
+        edit(document)
+        file(root).write_text(json.dumps(document))
 
     return plant
 
@@ -130,9 +134,9 @@ def house_json(root: Path) -> Path:
 def wrong_tracks(edit: Callable[[dict], None]) -> Callable[[Path], None]:
     def plant(root: Path) -> None:
         file = house_json(root).with_name("tracks.npz")
-        held = dict(np.load(file))
-        edit(held)
-        np.savez_compressed(file, **held)
+        arrays = dict(np.load(file))
+        edit(arrays)
+        np.savez_compressed(file, **arrays)
 
     return plant
 
@@ -162,10 +166,10 @@ FALSEHOODS = {
 
 @pytest.mark.long
 @pytest.mark.parametrize("name", FALSEHOODS)
-def test_a_falsehood_about_motion_is_found(made: Path, tmp_path: Path, name: str) -> None:
+def test_a_falsehood_about_motion_is_found(finished_run: Path, tmp_path: Path, name: str) -> None:
     plant, check = FALSEHOODS[name]
     root = tmp_path / "root"
-    shutil.copytree(made, root)
+    shutil.copytree(finished_run, root)
     plant(root)
     sign(root, house_json(root).parent)
     counts = verify(root, sample=1000).counts
@@ -173,16 +177,16 @@ def test_a_falsehood_about_motion_is_found(made: Path, tmp_path: Path, name: str
 
 
 @pytest.mark.long
-def test_a_film_in_memory_shows_what_each_time_shows(moving: pf.Home) -> None:
+def test_a_film_in_memory_shows_the_home_at_each_time(moving: pf.Home) -> None:
     camera = moving.viewpoint(moving.cameras_around("door_inner", distance_m=(1.5, 2.5))[0].camera)
     frames = pf.film(moving, camera.camera, fps=4, seconds=0.75, modes=[], layers=["part"])
     assert [frame.ref.view for frame in frames] == ["frame_00000", "frame_00001", "frame_00002"]
-    # The home stopped at a frame's time, rendered by itself, has the same labels.
+    # The home stopped at a frame's time and rendered separately has the same labels.
     stopped = pf.render(moving.at(0.5), camera.camera, modes=[], layers=["part"])
     np.testing.assert_array_equal(frames[2].depth, stopped.depth)
     np.testing.assert_array_equal(frames[2].layer("part"), stopped.layer("part"))
     assert (frames[0].depth != frames[2].depth).mean() > 0.02
-    # Another film of the same frames is another one.
+    # A film of the same frames at other times is another film.
     later = pf.film(moving, camera.camera, 4, 0.75, from_s=0.5, modes=[], layers=["part"])
     np.testing.assert_array_equal(later[0].depth, frames[2].depth)
 
@@ -198,7 +202,7 @@ def test_pictures_of_opengl_follow(moving: pf.Home) -> None:
         assert (film[0].picture(mode) != film[1].picture(mode)).mean() > 0.02
 
 
-def test_a_wrong_film_is_told(moving: pf.Home) -> None:
+def test_a_wrong_film_is_refused(moving: pf.Home) -> None:
     camera = moving.cameras_around("door_inner", distance_m=(1.5, 2.5))[0].camera
     with pytest.raises(pf.BadInput, match="4 frames"):
         pf.film(moving, [camera] * 3, fps=2, seconds=2, modes=[])
@@ -212,29 +216,28 @@ def test_a_rig_films_each_frame_by_all_its_cameras(moving: pf.Home) -> None:
     film = pf.film(moving, camera, fps=2, seconds=1, modes=[], layers=["disparity"], rig=rig)
     names = ["frame_00000", "frame_00000_b", "frame_00001", "frame_00001_b"]
     assert [frame.ref.view for frame in film] == names
-    # The same pictures as by cameras of one's own, at that time.
+    # The same pictures as from explicit cameras at that time.
     pose = camera.world_from_camera.copy()
     pose[:3, 3] += 0.2 * pose[:3, 0]
     aside = replace(camera, world_from_camera=pose)
     alone = pf.render(moving.at(0.5), aside, modes=[])
     np.testing.assert_array_equal(film[3].depth, alone.depth)
     assert film[3].table["rig"]["camera"] == "b"
-    seen = (film[0].depth > 0) & (film[0].layer("disparity") > 0)
+    both_seen = (film[0].depth > 0) & (film[0].layer("disparity") > 0)
     f = film[0].table["K"][0][0]
-    expected = 256 * f * 0.2 / film[0].depth[seen]
-    np.testing.assert_allclose(film[0].layer("disparity")[seen], expected, rtol=2e-3, atol=1)
+    expected = 256 * f * 0.2 / film[0].depth[both_seen]
+    np.testing.assert_allclose(film[0].layer("disparity")[both_seen], expected, rtol=2e-3, atol=1)
     with pytest.raises(pf.BadInput, match=r"rig: cameras\[0\].yaw"):
         pf.film(moving, camera, fps=2, seconds=1, rig={"cameras": [{"name": "a", "yaw": 3}]})
 
 
 @pytest.mark.long
-def test_a_film_that_was_killed_goes_on_where_it_was(
-    made: Path, moving: pf.Home, tmp_path: Path
-) -> None:
+def test_a_killed_film_is_resumed(finished_run: Path, moving: pf.Home, tmp_path: Path) -> None:
     root = tmp_path / "root"
-    shutil.copytree(made, root)
+    shutil.copytree(finished_run, root)
     (folder,) = root.glob("houses/*")
-    # As a kill leaves it: one frame is not begun, of one its last step, and tracks, are not done.
+    # State after a kill: one frame is not started; of another the last step, and the tracks, are
+    # missing.
     shutil.rmtree(folder / "views/frame_00001")
     for marker in folder.glob("done/*frame_00001.json"):
         marker.unlink()
@@ -251,7 +254,7 @@ def test_a_film_that_was_killed_goes_on_where_it_was(
         "opengl_dl frame_00001", "tracks None", "truth frame_00001", "view frame_00001",
         "view frame_00002",
     ]  # fmt: skip
-    ((before, after),) = zip(made.glob("houses/*"), root.glob("houses/*"), strict=True)
+    ((before, after),) = zip(finished_run.glob("houses/*"), root.glob("houses/*"), strict=True)
     names = [
         p.relative_to(before) for p in before.rglob("*") if p.is_file() and p.parent.name != "done"
     ]

@@ -1,4 +1,4 @@
-"""Frames of a walk share pilots and noise: fewer pilots, noise that stays, and no order of rendering shows."""
+"""Frames of a walk share pilots and noise: fewer pilots, static noise, and independence of the rendering order."""
 
 from dataclasses import replace
 
@@ -36,19 +36,19 @@ def setup_of(view: View, every: dict[str, View], recipe: Recipe = FAST) -> ViewS
     return ViewSetup(CachedHouse(MemoryStore(), recipe, "home", ""), view, every)
 
 
-def test_ten_frames_have_one_pilot_left_and_right_apart() -> None:
-    every = views()
-    pilots = [pilot for v in every.values() if (pilot := setup_of(v, every).pilot)]
-    # Two cameras, and of each all frames but the first of ten.
+def test_ten_frames_share_one_pilot_per_eye() -> None:
+    walk = views()
+    pilots = [pilot for v in walk.values() if (pilot := setup_of(v, walk).pilot)]
+    # Two cameras, each with all frames except the first of ten.
     assert len(pilots) == 2 * (9 + 1)
     places = {(round(float(pilot.camera.eye[0]), 4), pilot.seed) for pilot in pilots}
-    firsts = [every[f"frame_000{n}{side}"] for n in ("00", "10") for side in ("", "_right")]
+    firsts = [walk[f"frame_000{n}{side}"] for n in ("00", "10") for side in ("", "_right")]
     assert places == {
-        (round(float(v.camera.eye[0]), 4), setup_of(v, every).light_seed(v)) for v in firsts
+        (round(float(v.camera.eye[0]), 4), setup_of(v, walk).light_seed(v)) for v in firsts
     }
 
 
-def test_a_view_that_is_no_frame_has_its_own() -> None:
+def test_a_view_that_is_no_frame_has_a_separate_pilot() -> None:
     alone = View("0_0_1", "0_0", 1, next(iter(views().values())).camera)
     assert setup_of(alone, {alone.id: alone}).pilot is None
 
@@ -59,40 +59,42 @@ def test_whichever_frame_is_rendered_first_changes_no_picture(
     recipe = recipe_from_name("preview", SMALL)
     house, _report = repair(builtin_home(), RepairFields())
     sky = CachedHouse(MemoryStore(), recipe, house.id, "").sky
-    every = views()
-    frames = [every[f"frame_{k:05d}"] for k in (1, 2)]
+    walk = views()
+    frames = [walk[f"frame_{k:05d}"] for k in (1, 2)]
     n_pilots = []
-    own = ViewEmitters.measure
-    monkeypatch.setattr(ViewEmitters, "measure", lambda *args: (n_pilots.append(1), own(*args))[1])
+    measure_before = ViewEmitters.measure
+    monkeypatch.setattr(
+        ViewEmitters, "measure", lambda *args: (n_pilots.append(1), measure_before(*args))[1]
+    )
 
     def pictures(order: list[View]) -> dict[str, np.ndarray]:
         scene = LightScene.load(house, decoded_textures(house)[0], recipe, sky)
         return {
             v.id: scene.render(
-                v.camera, "0_0", recipe.light, 7, pilot=setup_of(v, every, recipe).pilot,
+                v.camera, "0_0", recipe.light, 7, pilot=setup_of(v, walk, recipe).pilot,
             ).indoor
             for v in order
         }  # fmt: skip
 
-    there, back = pictures(frames), pictures(frames[::-1])
+    in_order, back = pictures(frames), pictures(frames[::-1])
     for view in frames:
-        np.testing.assert_array_equal(there[view.id], back[view.id])
+        np.testing.assert_array_equal(in_order[view.id], back[view.id])
     assert len(n_pilots) == 2  # one for each scene
 
 
-def test_frames_of_an_eye_have_one_seed_and_other_views_their_own() -> None:
-    every = views()
-    setup = setup_of(every["frame_00000"], every)
-    assert len({setup.light_seed(view) for view in every.values()}) == 2
-    alone = View("0_0_1", "0_0", 1, every["frame_00000"].camera)
+def test_frames_of_an_eye_share_a_seed_and_other_views_do_not() -> None:
+    walk = views()
+    setup = setup_of(walk["frame_00000"], walk)
+    assert len({setup.light_seed(view) for view in walk.values()}) == 2
+    alone = View("0_0_1", "0_0", 1, walk["frame_00000"].camera)
     seed = keys.seed("home", "0_0_1", "light", setup.light_digest)
     assert setup.light_seed(alone) == seed
 
 
-def test_a_camera_that_stands_still_sees_its_noise_again() -> None:
-    every = views()
-    still = every["frame_00000"].camera
-    every["frame_00001"] = replace(every["frame_00001"], camera=still)
+def test_a_static_camera_sees_the_same_noise() -> None:
+    walk = views()
+    still = walk["frame_00000"].camera
+    walk["frame_00001"] = replace(walk["frame_00001"], camera=still)
     recipe = recipe_from_name("preview", SMALL)
     house, _report = repair(builtin_home(), RepairFields())
     sky = CachedHouse(MemoryStore(), recipe, house.id, "").sky
@@ -102,15 +104,15 @@ def test_a_camera_that_stands_still_sees_its_noise_again() -> None:
             still, "0_0", recipe.light, setup.light_seed(setup.view),
             pilot=setup.pilot, anchors=setup.anchors,
         ).indoor
-        for setup in (setup_of(every[f"frame_0000{k}"], every, recipe) for k in (0, 1))
+        for setup in (setup_of(walk[f"frame_0000{k}"], walk, recipe) for k in (0, 1))
     )  # fmt: skip
-    # A share of the points goes over to the next anchor: one of the frames from one to the next.
+    # A share of the points changes to the next anchor: one step between consecutive frames.
     same = float((first == second).all(-1).mean())
     assert 0.8 < same < 1
     assert np.abs(first - second).max() > 0
 
 
 def test_a_view_that_is_no_frame_has_no_anchors() -> None:
-    every = views()
-    alone = View("0_0_1", "0_0", 1, every["frame_00000"].camera)
-    assert setup_of(alone, every | {alone.id: alone}).anchors is None
+    walk = views()
+    alone = View("0_0_1", "0_0", 1, walk["frame_00000"].camera)
+    assert setup_of(alone, walk | {alone.id: alone}).anchors is None

@@ -1,4 +1,4 @@
-"""The whole pipeline on the built-in home, small: what a run leaves behind."""
+"""The whole pipeline on the built-in home, small: outputs of a run."""
 
 from __future__ import annotations
 
@@ -21,26 +21,26 @@ from pbrs_farm.transport.scene_tables.sky import clear_sky_lx
 from tests.inputs.small_recipes import small
 
 OPTIONAL = [name for name in layers.OPTIONAL if not LAYER[name].partner]
-ALONE = [x for x in LAYERS if not x.partner]  # what a view has without a partner
+ALONE = [x for x in LAYERS if not x.partner]  # layers of a view without a partner
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Summary]:
+def finished_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Summary]:
     out = tmp_path_factory.mktemp("out")
     return out, run_local(Run(["builtin"], str(out), small(), wanted([], OPTIONAL, 2)))
 
 
 @pytest.fixture
-def view(made: tuple[Path, Summary]) -> Path:
-    return sorted(made[0].glob("houses/*/views/*"))[0]
+def view(finished_run: tuple[Path, Summary]) -> Path:
+    return sorted(finished_run[0].glob("houses/*/views/*"))[0]
 
 
-def test_nothing_fails(made: tuple[Path, Summary]) -> None:
-    assert made[1].failures == []
-    assert made[1].n_views == 2
+def test_nothing_fails(finished_run: tuple[Path, Summary]) -> None:
+    assert finished_run[1].failures == []
+    assert finished_run[1].n_views == 2
 
 
-def test_every_layer_is_there_in_its_type(view: Path) -> None:
+def test_every_layer_is_stored_in_its_type(view: Path) -> None:
     for layer in ALONE:
         data = (view / layer.file).read_bytes()
         if layer.file.endswith(".png"):
@@ -62,10 +62,10 @@ def test_the_pictures_are_lit(view: Path) -> None:
         assert 20 < array_from_png((view / f"{mode}.png").read_bytes()).mean() < 240, mode
 
 
-def test_every_rooms_illuminance_is_recorded_once_and_each_view_repeats_its_own(
-    made: tuple[Path, Summary],
+def test_every_rooms_illuminance_is_recorded_once_and_repeated_by_its_views(
+    finished_run: tuple[Path, Summary],
 ) -> None:
-    house = next(made[0].glob("houses/*"))
+    house = next(finished_run[0].glob("houses/*"))
     record = json.loads((house / "illuminance.json").read_text())
     rooms = {row["room"]: row for row in record["rooms"]}
     described = json.loads((house / "house.json").read_text())
@@ -90,21 +90,23 @@ def test_labels_agree_with_the_table(view: Path) -> None:
         assert set(semantic[instance == number]) == {table[number]["nyu40"]}
 
 
-def test_verify_finds_nothing_wrong(made: tuple[Path, Summary]) -> None:
-    certificate = verify(made[0], sample=500)
+def test_verify_finds_nothing_wrong(finished_run: tuple[Path, Summary]) -> None:
+    certificate = verify(finished_run[0], sample=500)
     assert certificate.is_clean, certificate.text()
 
 
-def test_a_second_run_renders_nothing(made: tuple[Path, Summary]) -> None:
-    again = run_local(Run(["builtin"], str(made[0]), small(), wanted([], OPTIONAL, 2)))
+def test_a_second_run_renders_nothing(finished_run: tuple[Path, Summary]) -> None:
+    again = run_local(Run(["builtin"], str(finished_run[0]), small(), wanted([], OPTIONAL, 2)))
     assert again.n_done == 0
     assert again.failures == []
 
 
 @pytest.mark.long
-def test_a_view_made_again_has_the_same_bytes(made: tuple[Path, Summary], tmp_path: Path) -> None:
+def test_a_view_made_again_has_the_same_bytes(
+    finished_run: tuple[Path, Summary], tmp_path: Path
+) -> None:
     root = tmp_path / "again"
-    shutil.copytree(made[0], root)
+    shutil.copytree(finished_run[0], root)
     before = (root / "manifest.jsonl").read_bytes()
     for marker in root.glob("houses/*/done/*_*.json"):
         marker.unlink()

@@ -26,7 +26,7 @@ def test_a_step_reads_only_steps_that_exist() -> None:
         assert {*step.after, *step.needs} <= set(plan.STEPS)
 
 
-def test_what_changes_illuminance_changes_light_too() -> None:
+def test_changes_of_illuminance_change_light_too() -> None:
     illuminance, light = plan.STEPS["illuminance"], plan.STEPS["light"]
     assert set(illuminance.groups) <= set(light.groups)
     assert set(illuminance.after) <= set(light.after)
@@ -68,7 +68,9 @@ def test_the_name_of_a_recipe_is_no_part_of_its_digest() -> None:
         ("released", "3260c220e3ee577743bebe2e37cbaa8d"),
     ],
 )
-def test_what_is_not_of_the_paper_is_off_in_paper_and_released(name: str, digest: str) -> None:
+def test_features_missing_in_the_paper_are_off_in_paper_and_released(
+    name: str, digest: str
+) -> None:
     assert recipe_from_name(name).digest() == digest
     assert not recipe_from_name(name).repair.lamp_in_every_room
     assert recipe_from_name(name).repair.lamp_lx == 0
@@ -77,25 +79,27 @@ def test_what_is_not_of_the_paper_is_off_in_paper_and_released(name: str, digest
     assert not recipe_from_name(name).repair.add_ceilings
     assert recipe_from_name(name).surroundings.kind == "none"
     assert recipe_from_name(name).selection.min_room_lx == 0
-    for other in ("preview", "fast"):
-        recipe = recipe_from_name(other)
+    for recipe_name in ("preview", "fast"):
+        recipe = recipe_from_name(recipe_name)
         assert recipe.repair.lamp_in_every_room
         assert recipe.repair.lamp_lx == 100
         assert recipe.repair.add_ceilings
         assert recipe.surroundings.kind == "drawn"
         settings = {"lamp_in_every_room": "false", "lamp_lx": "0", "add_ceilings": "false"}
-        off = recipe_from_name(other, {f"repair.{field}": word for field, word in settings.items()})
+        off = recipe_from_name(
+            recipe_name, {f"repair.{field}": word for field, word in settings.items()}
+        )
         assert recipe.digest("repair") != off.digest("repair")
         assert off.digest("repair") == recipe_from_name(name).digest("repair")
 
 
-def test_layers_of_lamps_are_stored_anew_and_change_no_picture() -> None:
+def test_layers_of_lamps_are_stored_again_and_change_no_picture() -> None:
     two, lamps = (recipe_from_name("fast", {"light.groups": word}) for word in ("two", "lamps"))
     assert lamps.picture_digest("light") == two.picture_digest("light")
     assert lamps.digest("light") != two.digest("light")
 
 
-def test_either_light_mode_asks_for_light() -> None:
+def test_either_light_mode_requests_light() -> None:
     want = plan.wanted(["mlt_ol"], [])
     assert plan.view_steps(want) == ("truth", "light", "develop", "view")
     assert plan.view_steps(plan.wanted(["opengl_il"], [])) == ("truth", "opengl_il", "view")

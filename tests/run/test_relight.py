@@ -1,4 +1,4 @@
-"""A stored view under other lamps: from its layers alone, by number, item, name or pattern."""
+"""A stored view under other lamps: from its layers only, by number, item, name or pattern."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ def small(**light: str) -> Recipe:
             "cameras.cell_m": "1.0",
             "cameras.score_width_px": "160",
             "cameras.score_height_px": "120",
-            "repair.lamp_in_every_room": "false",  # the home's own two lamps, by name
+            "repair.lamp_in_every_room": "false",  # the home's two lamps, by name
             **{f"light.{name}": value for name, value in light.items()},
         },
     )
@@ -113,9 +113,7 @@ def test_verify_sees_a_lamp_that_indoor_is_not_the_sum_of(root: Path, tmp_path: 
     assert verify(copy, sample=100).counts["lamps"].failed == 1
 
 
-def test_with_every_factor_1_the_file_is_the_one_that_was_rendered(
-    view: Path, tmp_path: Path
-) -> None:
+def test_with_every_factor_1_the_file_equals_the_rendered_one(view: Path, tmp_path: Path) -> None:
     relit(view, tmp_path, "--lamp", "*=1", "--indoor", "1")
     assert (tmp_path / "relit.png").read_bytes() == (view / "mlt_il_ol.png").read_bytes()
 
@@ -128,7 +126,7 @@ def test_a_lamp_answers_to_its_number_its_item_its_name_and_a_pattern(
     assert (dimmed != relit(view, tmp_path)).any()
     for word in (row["item"], row["name"], f"{str(row['item'])[:-1]}*"):
         np.testing.assert_array_equal(dimmed, relit(view, tmp_path, "--lamp", f"{word}=0.25"))
-    # The last word counts.
+    # The last argument wins.
     number = str(row["number"])
     words = ("--lamp", "*=7", "--lamp", f"{number}=0.25")
     np.testing.assert_array_equal(dimmed, relit(view, tmp_path, *words))
@@ -164,7 +162,7 @@ def test_a_list_makes_no_picture(view: Path, capsys: pytest.CaptureFixture[str])
     assert "makes no picture" in capsys.readouterr().err
 
 
-def test_a_lamp_that_brings_no_light_is_told(view: Path, tmp_path: Path) -> None:
+def test_a_lamp_without_light_is_reported(view: Path, tmp_path: Path) -> None:
     rows = [{**row, "layer": None} for row in lamps_of(view)]
     (tmp_path / "view.json").write_text(json.dumps({"modes": {"light": {"lamps": rows}}}))
     words = [LampFactor("1", (0, 0, 0)), LampFactor("*", (1, 1, 1))]
@@ -184,7 +182,7 @@ def test_a_lamp_that_brings_no_light_is_told(view: Path, tmp_path: Path) -> None
         ("=0.5", "expected LAMP=F"),
     ],
 )
-def test_a_wrong_word_is_told(
+def test_a_wrong_argument_is_refused(
     word: str, says: str, view: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "never.png"
@@ -193,10 +191,10 @@ def test_a_wrong_word_is_told(
     assert not out.exists()
 
 
-def test_a_view_of_two_groups_says_how_to_have_lamps_and_gets_them_with_the_same_pictures(
+def test_a_view_of_two_groups_explains_how_to_add_lamps_and_keeps_its_pictures(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    # Without the denoiser, which may turn a rounding into a step of 8 bits.
+    # Without the denoiser, which may amplify a rounding error to a step of 8 bits.
     out = tmp_path / "two"
     run(out, small(denoise="false"))
     view = next(out.glob("houses/*/views/*"))
@@ -205,7 +203,7 @@ def test_a_view_of_two_groups_says_how_to_have_lamps_and_gets_them_with_the_same
     for words in (("--lamp", "1=0"), ("--list",)):
         assert main(["relight", str(view), *words]) == 1
         assert "--groups lamps" in capsys.readouterr().err
-    # Light, develop, view and nothing else run again.
+    # Only light, develop and view run again.
     assert run(out, small(denoise="false", groups="lamps"), update=True) == 3
     assert (view / "mlt_ol.png").read_bytes() == outdoor
     after = array_from_png((view / "mlt_il_ol.png").read_bytes()).astype(int)
@@ -222,7 +220,7 @@ def test_a_view_is_named_by_the_url_of_its_store_too(
     assert out.read_bytes() == (view / "mlt_il_ol.png").read_bytes()
     assert main(["relight", view.as_uri(), "--list"]) == 0
     assert capsys.readouterr().out.splitlines()[1].startswith("lamp")
-    # What is no view, and a view that is not there, are one line that names the URL.
+    # A folder that is no view, and a missing view, are one line that names the URL.
     for url in (view.parents[3].as_uri(), f"{view.as_uri()}_9"):
         assert main(["relight", url]) == 1
         assert url in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""The supervisor of render processes, on a fake clock and with a fake process: who is killed, when."""
+"""The supervisor of render processes, with a fake clock and process: who is killed, when."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ LIMITS = ProcessLimits(
 
 
 class Bench:
-    """A RenderProcess and the fake processes it has started; `next` is the one it starts next."""
+    """A RenderProcess and the fake processes it has started; `next` is the next one to start."""
 
     def __init__(self, limits: ProcessLimits = LIMITS) -> None:
         self.clock = FakeClock()
@@ -38,21 +38,21 @@ class Bench:
         return self.started[-1]
 
     def run(self, *, task_s: float = math.inf) -> tuple[list[Message], Ended]:
-        """Give it a task and wait for its end; what it said meanwhile."""
+        """Give it a task and wait for its end. Returns its messages until then."""
         self.process.begin(b"task", task_s=task_s)
         heard = []
         while True:
-            what = self.process.poll(1.0)
-            if isinstance(what, Ended):
+            message = self.process.poll(1.0)
+            if isinstance(message, Ended):
                 assert not self.process.is_busy
-                return heard, what
-            heard += [what] if what is not None else []
+                return heard, message
+            heard += [message] if message is not None else []
 
 
-def test_a_task_ends_with_what_the_process_says_of_it() -> None:
+def test_a_task_ends_with_the_message_of_its_process() -> None:
     bench = Bench()
-    for at, kind in ((2.0, "ready"), (3.0, "step"), (9.0, "done")):
-        bench.next.at(at, kind, kind, n=7)  # type: ignore[arg-type]
+    for at_s, kind in ((2.0, "ready"), (3.0, "step"), (9.0, "done")):
+        bench.next.at(at_s, kind, kind, n=7)  # type: ignore[arg-type]
     heard, ended = bench.run()
     assert [m.kind for m in heard] == ["ready", "step"]
     assert ended == Ended(9.0, "", "done", {"n": 7})
@@ -93,8 +93,8 @@ def test_a_line_in_the_log_is_a_sign_of_life() -> None:
         child.log += "line\n"
 
     child.at(0, "ready")
-    for at in (20, 40, 60):
-        child.at(at, speak)
+    for at_s in (20, 40, 60):
+        child.at(at_s, speak)
     child.at(80, "done")
     assert bench.run()[1].cause == ""
 
@@ -108,19 +108,19 @@ def test_a_step_over_its_time_is_killed_though_it_writes_to_its_log() -> None:
 
     child.at(0, "ready")
     child.at(10, "step", "light")
-    for at in range(20, 200, 10):
-        child.at(at, speak)
+    for at_s in range(20, 200, 10):
+        child.at(at_s, speak)
     _heard, ended = bench.run()
     assert ended.cause == "timeout"
     assert "100 s; killed" in ended.text
     assert 110 < bench.clock.now <= 112
 
 
-def test_each_step_has_its_own_time_but_the_task_has_one_too() -> None:
+def test_each_step_has_a_time_limit_and_so_has_the_task() -> None:
     bench = Bench()
     bench.next.at(0, "ready")
-    for at in range(0, 300, 20):
-        bench.next.at(at, "step")
+    for at_s in range(0, 300, 20):
+        bench.next.at(at_s, "step")
     _heard, ended = bench.run(task_s=200)
     assert ended.cause == "timeout"
     assert 200 < ended.seconds <= 202
@@ -129,8 +129,8 @@ def test_each_step_has_its_own_time_but_the_task_has_one_too() -> None:
 def test_time_without_storage_counts_for_no_limit() -> None:
     bench = Bench()
     bench.next.at(0, "ready")
-    for at in range(20, 400, 20):
-        bench.next.at(at, "waiting")
+    for at_s in range(20, 400, 20):
+        bench.next.at(at_s, "waiting")
     bench.next.at(395, "done")
     assert bench.run(task_s=50)[1].cause == ""
 
@@ -176,7 +176,7 @@ def test_a_process_over_its_memory_is_killed_even_while_it_talks() -> None:
         (-signal.SIGKILL, "resource", "out of memory?"),
     ],
 )
-def test_a_death_is_told_by_its_cause(code: int, cause: str, text: str) -> None:
+def test_a_death_is_reported_with_its_cause(code: int, cause: str, text: str) -> None:
     bench = Bench()
     child = bench.next
     child.at(0, "ready")
@@ -225,7 +225,7 @@ def test_closing_lets_an_idle_process_end_and_kills_a_busy_one() -> None:
     assert bench.started[1].was_killed
 
 
-def test_a_process_started_before_its_task_serves_it_and_is_killed_where_none_comes() -> None:
+def test_an_early_process_serves_its_task_or_is_killed_without_one() -> None:
     bench = Bench()
     bench.next.at(0, "ready")
     bench.next.at(1, "done")
@@ -239,7 +239,7 @@ def test_a_process_started_before_its_task_serves_it_and_is_killed_where_none_co
 
 
 def make_handler(send: Send) -> Handler:
-    """A real process for the test below: it does what the request's word says."""
+    """A real process for the test below: it acts according to the request's word."""
 
     def handle(line: bytes) -> Message:
         word = line.decode().strip()
@@ -260,9 +260,9 @@ def test_real_processes_live_and_die_as_the_fake_ones(tmp_path: Path) -> None:
 
     def run(word: str) -> tuple[str, str]:
         process.begin(word.encode())
-        while not isinstance(what := process.poll(0.2), Ended):
+        while not isinstance(message := process.poll(0.2), Ended):
             pass
-        return what.cause, what.text
+        return message.cause, message.text
 
     try:
         assert run("fine") == ("", "fine")
@@ -276,7 +276,7 @@ def test_real_processes_live_and_die_as_the_fake_ones(tmp_path: Path) -> None:
 
 
 class _Kept:
-    """What a library holds until the interpreter is taken apart."""
+    """An object that a library holds until the interpreter exits."""
 
     def __del__(self) -> None:
         os.write(2, b"taken apart\n")
@@ -286,13 +286,13 @@ _KEPT: list[_Kept] = []
 
 
 def make_leaving_handler(_send: Send) -> Handler:
-    """A handler that has something left to do when its process ends."""
+    """A handler with work left when its process ends."""
     atexit.register(sys.stdout.write, "left in order\n")
     _KEPT.append(_Kept())
     return lambda line: Message("done", line.decode())
 
 
-def test_a_process_that_ends_does_what_is_left_and_is_not_taken_apart(
+def test_an_ending_process_finishes_its_work_without_interpreter_teardown(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.delenv("PYTHONUNBUFFERED", raising=False)

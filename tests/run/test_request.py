@@ -1,4 +1,4 @@
-"""One field of run/request.py is an option of run and submit, an entry of job.toml, and a job's own."""
+"""A field of run/request.py is an option of run and submit, an entry of job.toml, and a job's field."""
 
 from __future__ import annotations
 
@@ -65,22 +65,22 @@ print("everywhere")
 
 
 @pytest.mark.kinds("option")
-def test_an_option_that_is_added_in_one_place_is_everywhere() -> None:
+def test_an_option_added_in_one_place_is_everywhere() -> None:
     words = [sys.executable, "-c", ADDED, str(request_module.__file__)]
     done = subprocess.run(words, capture_output=True, text=True, cwd=Path(__file__).parents[2])
     assert (done.stdout, done.returncode) == ("everywhere\n", 0), done.stderr
 
 
-def given(*words: str) -> RunRequest:
+def request_of(*words: str) -> RunRequest:
     p = argparse.ArgumentParser(exit_on_error=False)
     add_options(p, RunRequest)
     return request_from(p.parse_args(list(words)), RunRequest)
 
 
-def test_what_is_not_given_is_the_field_s_default() -> None:
-    assert given() == RunRequest()
-    assert wanted_of(given()) == Wanted()
-    assert given().modes == ALL_MODES
+def test_an_omitted_option_has_the_fields_default() -> None:
+    assert request_of() == RunRequest()
+    assert wanted_of(request_of()) == Wanted()
+    assert request_of().modes == ALL_MODES
 
 
 @pytest.mark.parametrize(
@@ -95,13 +95,13 @@ def test_what_is_not_given_is_the_field_s_default() -> None:
 )
 def test_a_value_below_its_limit_is_named(words: list[str], message: str) -> None:
     with pytest.raises(BadInput) as caught:
-        given(*words)
+        request_of(*words)
     assert str(caught.value).startswith(message)
 
 
 def test_modes_and_layers_are_in_their_tables_order_and_known() -> None:
-    asked = given("--modes", "mlt_ol", "opengl_dl", "--layers", "depth_z", "albedo")
-    assert asked.modes == (Mode.OPENGL_DL, Mode.MLT_OL)
+    request = request_of("--modes", "mlt_ol", "opengl_dl", "--layers", "depth_z", "albedo")
+    assert request.modes == (Mode.OPENGL_DL, Mode.MLT_OL)
     with pytest.raises(BadInput, match="--layers: albdo: no such layer"):
         wanted_of(Wanted(layers=("albdo",)))
 
@@ -110,13 +110,13 @@ def test_every_short_form_names_a_field_of_the_recipe() -> None:
     assert set(SHORT_FORMS.values()) <= set(field_paths())
 
 
-def test_every_option_says_what_it_is_for() -> None:
+def test_every_option_has_a_help_text() -> None:
     for model in (RunRequest, SubmitRequest):
         for name, (field, _shown) in options_of(model).items():
             assert model.model_fields[field].description, name
 
 
-def test_a_job_is_what_its_request_asks_for() -> None:
+def test_a_job_has_the_fields_of_its_request() -> None:
     want = Wanted(modes=("opengl_dl",), layers=("albedo",), n_views=3, pairs=True)
     spec = JobSpec(job_id="", version="", recipe=Recipe(), **dict(want))
     assert wanted_of(JobSpec.model_validate_json(spec.model_dump_json())) == want

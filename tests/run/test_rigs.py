@@ -1,4 +1,4 @@
-"""A walk by a rig of four cameras through the small home: what a run leaves, what verify says of it, and exports."""
+"""A walk by a rig of four cameras through the small home: outputs of a run, checks of verify, and exports."""
 
 from __future__ import annotations
 
@@ -89,8 +89,8 @@ def house(root: Path) -> Path:
 
 
 def table(root: Path, view: str) -> dict[str, Any]:
-    found: dict[str, Any] = json.loads((house(root) / f"views/{view}/view.json").read_text())
-    return found
+    view_facts: dict[str, Any] = json.loads((house(root) / f"views/{view}/view.json").read_text())
+    return view_facts
 
 
 @pytest.mark.long
@@ -100,17 +100,21 @@ def test_each_instant_has_a_view_of_every_camera(root: Path) -> None:
 
 
 @pytest.mark.long
-def test_a_view_tells_rig_camera_instant_and_transform(root: Path) -> None:
-    told = table(root, "frame_00001_left")["rig"]
-    assert (told["name"], told["camera"], told["instant"]) == ("head", "left", "frame_00001")
+def test_a_view_records_rig_camera_instant_and_transform(root: Path) -> None:
+    rig_facts = table(root, "frame_00001_left")["rig"]
+    assert (rig_facts["name"], rig_facts["camera"], rig_facts["instant"]) == (
+        "head",
+        "left",
+        "frame_00001",
+    )
     c, s = math.cos(math.radians(10)), math.sin(math.radians(10))
-    # Its z axis looks to the rig's left and 10 degrees up, and y is down.
+    # Its z axis points to the rig's left and 10 degrees up, and y is down.
     expected = [[0, -s, -c, -0.1], [0, c, -s, -0.02], [1, 0, 0, 0], [0, 0, 0, 1]]
-    np.testing.assert_allclose(told["rig_from_camera_opencv"], expected, atol=1e-12)
+    np.testing.assert_allclose(rig_facts["rig_from_camera_opencv"], expected, atol=1e-12)
 
 
 @pytest.mark.long
-def test_the_cameras_of_an_instant_stand_as_the_rig_says(root: Path) -> None:
+def test_the_cameras_of_an_instant_have_the_rigs_poses(root: Path) -> None:
     poses = {
         eye: np.array(table(root, f"frame_00002{eye}")["world_from_camera_opencv"]) for eye in EYES
     }
@@ -154,9 +158,9 @@ def test_verify_finds_a_rig_that_is_not_the_recipes(
 ) -> None:
     shutil.copytree(root, tmp_path / "root", ignore=lambda *_: ["views"])
     file = tmp_path / "root/recipe.json"
-    held = json.loads(file.read_text())
-    change(held["rig"])
-    file.write_text(json.dumps(held))
+    document = json.loads(file.read_text())
+    change(document["rig"])
+    file.write_text(json.dumps(document))
     assert verify(tmp_path / "root", sample=2).counts["sequence"].failed > 0
 
 
@@ -164,10 +168,10 @@ def test_verify_finds_a_rig_that_is_not_the_recipes(
 def test_verify_finds_a_camera_that_left_its_rig(root: Path, tmp_path: Path) -> None:
     shutil.copytree(root, tmp_path / "root", ignore=lambda *_: ["views"])
     file = house(tmp_path / "root") / "cameras.json"
-    held = json.loads(file.read_text())
-    row = next(row for row in held["views"] if row["id"] == "frame_00001_back")
+    document = json.loads(file.read_text())
+    row = next(row for row in document["views"] if row["id"] == "frame_00001_back")
     row["world_from_camera_opengl"][0][3] += 0.001
-    file.write_text(json.dumps(held))
+    file.write_text(json.dumps(document))
     assert verify(tmp_path / "root", sample=2).counts["sequence"].failed == 1
 
 
@@ -201,25 +205,27 @@ def test_colmap_has_the_rig_and_its_frames(root: Path, tmp_path: Path) -> None:
 
     def motion(words: list[str]) -> np.ndarray:
         w, x, y, z, *shift = map(float, words)
-        found = np.eye(4)
-        found[:3, :3], found[:3, 3] = Rotation.from_quat([x, y, z, w]).as_matrix(), shift
-        return found
+        matrix = np.eye(4)
+        matrix[:3, :3], matrix[:3, 3] = Rotation.from_quat([x, y, z, w]).as_matrix(), shift
+        return matrix
 
-    # A camera's pose is that of its rig, then its own in the rig: for every image of every frame.
-    own = {"1": np.eye(4)} | {rig[k + 1]: motion(rig[k + 3 : k + 10]) for k in range(4, 31, 10)}
+    # A camera's pose is the rig's pose times its pose in the rig, for every image of every frame.
+    camera_from_rig = {"1": np.eye(4)} | {
+        rig[k + 1]: motion(rig[k + 3 : k + 10]) for k in range(4, 31, 10)
+    }
     frames = [line.split() for line in (sparse / "frames.txt").read_text().splitlines()]
     assert len(frames) == 3
-    seen = set()
+    frames_seen = set()
     for frame in frames:
         rig_from_world = motion(frame[2:9])
         for k in range(10, len(frame), 3):
             sensor, image = frame[k + 1 : k + 3]
             assert poses[image][8] == sensor
             np.testing.assert_allclose(
-                own[sensor] @ rig_from_world, motion(poses[image][1:8]), atol=1e-6
+                camera_from_rig[sensor] @ rig_from_world, motion(poses[image][1:8]), atol=1e-6
             )
-            seen.add(image)
-    assert seen == set(poses)
+            frames_seen.add(image)
+    assert frames_seen == set(poses)
 
 
 @pytest.mark.long
@@ -250,7 +256,7 @@ def test_a_recipe_with_a_rig_is_written_and_read_as_the_same(tmp_path: Path) -> 
         ("[[cameras]", "is not valid TOML"),
     ],
 )
-def test_a_file_that_is_no_rig_is_an_error_of_one_line_with_its_place(
+def test_a_file_that_is_no_rig_is_refused_with_its_place(
     text: str, told: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file = rig_file(tmp_path, text)

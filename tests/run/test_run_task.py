@@ -1,4 +1,4 @@
-"""What a render process does with a task, in this process."""
+"""Tasks of a render process, run in this process."""
 
 from pathlib import Path
 
@@ -15,16 +15,16 @@ from pbrs_farm.run.processes.render_task import RenderTask, Setting
 def test_memory_is_given_back_once_a_house_is_made(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    said: list[str] = []
-    monkeypatch.setattr(run_task, "give_back_memory", lambda: said.append("given back"))
+    lines: list[str] = []
+    monkeypatch.setattr(run_task, "give_back_memory", lambda: lines.append("given back"))
     setting = Setting(
         str(tmp_path), recipe_from_name("preview", {}), 1, runner="tests.run.fakes:run_step"
     )
     source = resolve("builtin")
 
     def hear(message: Message) -> None:
-        said.append(f"{message.kind} {message.body.get('step', message.text)}")
+        lines.append(f"{message.kind} {message.body.get('step', message.text)}")
 
     task = RenderTask(source.house_id, ("house", "cameras"), source)
     run_task.run_task(hear, setting, HouseCache(), task)
-    assert said == ["step house", "given back", "event house", "step cameras", "event cameras"]
+    assert lines == ["step house", "given back", "event house", "step cameras", "event cameras"]

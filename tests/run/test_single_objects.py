@@ -1,4 +1,4 @@
-"""Objects without context: 20 views, nothing where the ray misses, no light but the sky."""
+"""Single objects: 20 views, no label where the ray misses, light only from the sky."""
 
 from __future__ import annotations
 
@@ -37,7 +37,7 @@ f 1 2 6 5
 
 
 @pytest.fixture(scope="module")
-def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Summary]:
+def finished_run(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Summary]:
     folder = tmp_path_factory.mktemp("models")
     (folder / "chair").mkdir()
     (folder / "chair" / "cube.obj").write_text(CUBE)
@@ -50,14 +50,14 @@ def made(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Summary]:
     return out, run_local(Run([], str(out), recipe, wanted([], [], 2), sources=[source]))
 
 
-def test_a_model_has_twenty_cameras(made: tuple[Path, Summary]) -> None:
-    assert made[1].failures == []
-    (cameras,) = made[0].glob("objects/*/cameras.json")
+def test_a_model_has_twenty_cameras(finished_run: tuple[Path, Summary]) -> None:
+    assert finished_run[1].failures == []
+    (cameras,) = finished_run[0].glob("objects/*/cameras.json")
     assert len(json.loads(cameras.read_text())["views"]) == 20
 
 
-def test_pixels_that_miss_are_zero_in_every_layer(made: tuple[Path, Summary]) -> None:
-    view = sorted(made[0].glob("objects/*/views/*"))[0]
+def test_pixels_that_miss_are_zero_in_every_layer(finished_run: tuple[Path, Summary]) -> None:
+    view = sorted(finished_run[0].glob("objects/*/views/*"))[0]
     missed = array_from_png((view / "valid.png").read_bytes()) == 0
     assert missed.any()
     assert not missed.all()
@@ -67,14 +67,14 @@ def test_pixels_that_miss_are_zero_in_every_layer(made: tuple[Path, Summary]) ->
         assert not channel[missed].any(), name
 
 
-def test_the_sky_alone_lights_it(made: tuple[Path, Summary]) -> None:
-    view = sorted(made[0].glob("objects/*/views/*"))[0]
+def test_only_the_sky_lights_it(finished_run: tuple[Path, Summary]) -> None:
+    view = sorted(finished_run[0].glob("objects/*/views/*"))[0]
     assert (view / "mlt_ol.png").read_bytes() == (view / "mlt_il_ol.png").read_bytes()
-    seen = array_from_png((view / "valid.png").read_bytes()) > 0
-    assert np.median(array_from_png((view / "mlt_ol.png").read_bytes())[seen]) > 30
+    visible = array_from_png((view / "valid.png").read_bytes()) > 0
+    assert np.median(array_from_png((view / "mlt_ol.png").read_bytes())[visible]) > 30
     assert "no lamps" in json.loads((view / "view.json").read_text())["modes"]["light"]["note"]
 
 
-def test_verify_takes_objects_too(made: tuple[Path, Summary]) -> None:
-    certificate = verify(made[0], sample=300)
+def test_verify_takes_objects_too(finished_run: tuple[Path, Summary]) -> None:
+    certificate = verify(finished_run[0], sample=300)
     assert certificate.is_clean, certificate.text()

@@ -1,4 +1,4 @@
-"""Optional layers of a root are a union: a run adds to what is there and takes nothing away."""
+"""Optional layers of a root are a union: a run adds layers and removes none."""
 
 from __future__ import annotations
 
@@ -23,7 +23,9 @@ def small(**settings: str) -> Recipe:
     return recipe_from_name("preview", {**sizes, **scores, **settings})
 
 
-def made(out: Path, layers: tuple[str, ...] = (), mode: str = "opengl_dl", **more: str) -> Summary:
+def run_with(
+    out: Path, layers: tuple[str, ...] = (), mode: str = "opengl_dl", **more: str
+) -> Summary:
     run = Run(["builtin"], str(out), small(**more), wanted([mode], layers, 1), update=bool(more))
     summary = run_local(run)
     assert summary.failures == []
@@ -32,8 +34,8 @@ def made(out: Path, layers: tuple[str, ...] = (), mode: str = "opengl_dl", **mor
 
 def description(out: Path) -> dict[str, object]:
     (path,) = out.glob("houses/*/views/*/view.json")
-    said: dict[str, object] = json.loads(path.read_bytes())
-    return said
+    document: dict[str, object] = json.loads(path.read_bytes())
+    return document
 
 
 def listed(out: Path) -> set[str]:
@@ -43,12 +45,12 @@ def listed(out: Path) -> set[str]:
 
 @pytest.mark.slow
 @pytest.mark.parametrize("mode", ["opengl_dl", "opengl_il"])
-def test_layers_stay_whatever_later_runs_ask_for(tmp_path: Path, mode: str) -> None:
-    made(tmp_path, HELD)
+def test_layers_survive_later_runs_with_other_layers(tmp_path: Path, mode: str) -> None:
+    run_with(tmp_path, HELD)
     first = {path: path.read_bytes() for path in tmp_path.glob("houses/*/views/*/*.*")}
     for layers in ((), ("albedo",), ("nyu13", *HELD[::-1])):
-        made(tmp_path, layers, mode)
-        assert made(tmp_path, layers, mode).n_done == 0, layers
+        run_with(tmp_path, layers, mode)
+        assert run_with(tmp_path, layers, mode).n_done == 0, layers
         certificate = verify(tmp_path, sample=200)
         assert certificate.is_clean, certificate.text()
         assert {*FILES} <= listed(tmp_path), layers
@@ -59,19 +61,19 @@ def test_layers_stay_whatever_later_runs_ask_for(tmp_path: Path, mode: str) -> N
 
 
 @pytest.mark.long
-def test_a_layer_that_cannot_be_made_costs_none_that_is_there(tmp_path: Path) -> None:
+def test_a_failed_layer_removes_no_existing_one(tmp_path: Path) -> None:
     fisheye = {"lens.preset": "tum_vi", "image.width_px": "48"}
-    made(tmp_path, ("albedo",), **fisheye)
+    run_with(tmp_path, ("albedo",), **fisheye)
     run = Run(["builtin"], str(tmp_path), small(**fisheye), wanted(["opengl_dl"], ["hha"], 1))
     assert run_local(run).failures
-    assert made(tmp_path, **fisheye).n_done == 0
+    assert run_with(tmp_path, **fisheye).n_done == 0
     assert "albedo.png" in listed(tmp_path)
 
 
 @pytest.mark.slow
-def test_what_another_recipe_left_behind_goes(tmp_path: Path) -> None:
-    made(tmp_path, HELD)
-    made(tmp_path, ("albedo",), **{"image.height_px": "40"})
+def test_files_of_another_recipe_are_removed(tmp_path: Path) -> None:
+    run_with(tmp_path, HELD)
+    run_with(tmp_path, ("albedo",), **{"image.height_px": "40"})
     certificate = verify(tmp_path, sample=200)
     assert certificate.is_clean, certificate.text()
     assert not list(tmp_path.glob("houses/*/views/*/material.png"))

@@ -1,4 +1,4 @@
-"""A verb's process that is killed costs one line, which names the file and the step."""
+"""A killed process of a verb costs one line, which names the file and the step."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from pbrs_farm.crash_notes import note_step
 from pbrs_farm.run.processes.verb_process import run_watched
 
 TARGET = "tests.run.dying_verbs:main"
-# Stands where the real library does, and dies as it did of open meshes.
+# Takes the place of the real library, and dies like it did on open meshes.
 DYING_LIBRARY = """
 import os, signal
 class Manifold:
@@ -34,57 +34,57 @@ sys.exit(main())
 """
 
 
-def test_the_exit_code_and_what_is_printed_are_the_verbs(capfd: pytest.CaptureFixture[str]) -> None:
-    said: list[str] = []
-    assert run_watched(TARGET, ["end", "0"], said.append) == 0
-    assert run_watched(TARGET, ["end", "130"], said.append) == 130
-    assert said == []
+def test_exit_code_and_output_are_the_verbs(capfd: pytest.CaptureFixture[str]) -> None:
+    lines: list[str] = []
+    assert run_watched(TARGET, ["end", "0"], lines.append) == 0
+    assert run_watched(TARGET, ["end", "130"], lines.append) == 130
+    assert lines == []
     assert capfd.readouterr().out == "done\ndone\n"
 
 
 @pytest.mark.parametrize("name", ["SIGSEGV", "SIGABRT", "SIGFPE"])
 def test_a_verb_that_is_killed_costs_a_line_with_file_and_step(name: str) -> None:
-    said: list[str] = []
-    assert run_watched(TARGET, ["die", name, "a.glb", "read", "repair"], said.append) == 1
-    assert said == [f"a.glb: repair: its process was killed by {name}"]
+    lines: list[str] = []
+    assert run_watched(TARGET, ["die", name, "a.glb", "read", "repair"], lines.append) == 1
+    assert lines == [f"a.glb: repair: its process was killed by {name}"]
 
 
 def test_a_verb_that_is_killed_before_any_file_is_named_by_its_words() -> None:
-    said: list[str] = []
-    assert run_watched(TARGET, ["die", "SIGSEGV"], said.append) == 1
-    assert said == ["die SIGSEGV: its process was killed by SIGSEGV"]
+    lines: list[str] = []
+    assert run_watched(TARGET, ["die", "SIGSEGV"], lines.append) == 1
+    assert lines == ["die SIGSEGV: its process was killed by SIGSEGV"]
 
 
-def test_nothing_is_left_behind_and_no_room_costs_the_place_alone(
+def test_no_file_is_left_behind_and_a_full_disk_costs_only_the_place(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path))
-    said: list[str] = []
+    lines: list[str] = []
     words = ["die", "SIGSEGV", "a.glb", "read"]
-    assert run_watched(TARGET, words, said.append) == 1
+    assert run_watched(TARGET, words, lines.append) == 1
     assert list(tmp_path.iterdir()) == []
     monkeypatch.setattr("tempfile.tempdir", str(tmp_path / "gone"))
-    assert run_watched(TARGET, words, said.append) == 1
-    assert run_watched(TARGET, ["end", "0"], said.append) == 0
+    assert run_watched(TARGET, words, lines.append) == 1
+    assert run_watched(TARGET, ["end", "0"], lines.append) == 0
     fault = "its process was killed by SIGSEGV"
-    assert said == [f"a.glb: read: {fault}", f"die SIGSEGV: {fault}"]
+    assert lines == [f"a.glb: read: {fault}", f"die SIGSEGV: {fault}"]
 
 
-def test_a_file_name_of_many_lines_stays_one_short_line() -> None:
-    said: list[str] = []
+def test_a_file_name_of_many_lines_is_printed_as_one_short_line() -> None:
+    lines: list[str] = []
     words = ["die", "SIGSEGV", "a\nCLEAN\n" + "b" * 5000, "read"]
-    assert run_watched(TARGET, words, said.append) == 1
-    (line,) = said
+    assert run_watched(TARGET, words, lines.append) == 1
+    (line,) = lines
     assert line.startswith("a?CLEAN?bbb")
     assert "\n" not in line
     assert len(line) < 400
 
 
-def test_nobody_is_told_where_nobody_watches() -> None:
+def test_nothing_is_printed_without_a_terminal() -> None:
     note_step("a.glb", "read")
 
 
-def test_ctrl_c_means_afterwards_what_it_did_before() -> None:
+def test_ctrl_c_keeps_its_handler_afterwards() -> None:
     before = signal.getsignal(signal.SIGINT)
     run_watched(TARGET, ["end", "0"], print)
     assert signal.getsignal(signal.SIGINT) is before
@@ -97,7 +97,7 @@ def test_ctrl_c_means_afterwards_what_it_did_before() -> None:
         ("repair builtin", "builtin: repair: "),
         ("cameras builtin", "builtin: repair: "),
         ("step house builtin", "builtin: repair: "),
-        ("run builtin", " house: FAILED: "),  # the pool's own line: its render process died
+        ("run builtin", " house: FAILED: "),  # the pool's line: its render process died
         ("demo --bare --home builtin", " house: FAILED: "),
     ],
 )
@@ -110,17 +110,17 @@ def test_no_library_takes_a_verb_that_reads_files_with_it(
     out.mkdir()
     if words.startswith("step"):
         (out / "recipe.json").write_text(Recipe().model_dump_json())
-    asked = words.split() + (["--out", str(out)] if "cameras" not in words else [])
+    arguments = words.split() + (["--out", str(out)] if "cameras" not in words else [])
     done = subprocess.run(
-        [sys.executable, "-c", READING.format(folder=str(library), words=asked)],
+        [sys.executable, "-c", READING.format(folder=str(library), words=arguments)],
         capture_output=True, text=True, check=False, cwd=tmp_path,
         env={**os.environ, "PYTHONPATH": os.pathsep.join(sys.path)},
     )  # fmt: skip
     assert done.returncode == 1
     assert "Traceback" not in done.stderr
-    told = [x for x in done.stderr.splitlines() if "killed by SIGSEGV" in x]
-    assert len(told) == 1
-    assert line in told[0]
+    lines = [x for x in done.stderr.splitlines() if "killed by SIGSEGV" in x]
+    assert len(lines) == 1
+    assert line in lines[0]
 
 
 def test_the_table_of_watched_modules_names_modules() -> None:

@@ -1,4 +1,4 @@
-"""Small rooms with boxes in them, built in code, and an independent look at them."""
+"""Small rooms with boxes in them, built in code, and an independent ray caster for them."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import replace
@@ -56,7 +56,7 @@ def shell(width: float, depth: float, height: float = 2.5, wall: float = 0.1) ->
 def room_house(
     items: Sequence[Item], width: float, depth: float, height: float = 2.5, **room: object
 ) -> House:
-    """A house of one rectangular room, lit by its windows unless said otherwise."""
+    """A house of one rectangular room, lit by its windows by default."""
     polygon = np.array([[0, 0], [width, 0], [width, depth], [0, depth]], np.float64)
     plain = Room("0_0", "room", "0", polygon, 0.0, height, lit_by=("windows",))
     return House(
@@ -92,7 +92,7 @@ def counter_of(house: House) -> Callable[[Sequence[Camera]], NDArray[np.uint32]]
 
 
 class IndependentLook:
-    """Distances and pictures of a house by trimesh and embreex, with nothing of transport/."""
+    """Distances and pictures of a house by trimesh and embreex, without code of transport/."""
 
     def __init__(self, house: House) -> None:
         geometry = geometry_from_house(house)
@@ -101,12 +101,12 @@ class IndependentLook:
 
     def clearance(self, point: NDArray[np.float64]) -> float:
         """Distance to the nearest triangle, metres."""
-        every = np.broadcast_to(point, (len(self.mesh.faces), 3))
-        nearest = trimesh.triangles.closest_point(self.mesh.triangles, every)
+        repeated = np.broadcast_to(point, (len(self.mesh.faces), 3))
+        nearest = trimesh.triangles.closest_point(self.mesh.triangles, repeated)
         return float(np.linalg.norm(nearest - point, axis=1).min())
 
-    def hold_the_rules_of_place(self, room: Room, camera: Camera, fields: CameraFields) -> None:
-        """Assert that a camera stands in its room, at a height of the recipe, clear of everything."""
+    def assert_rules_of_place(self, room: Room, camera: Camera, fields: CameraFields) -> None:
+        """Assert that a camera is in its room, at a height of the recipe, clear of everything."""
         x, y, z = camera.eye
         assert shapely.Polygon(room.polygon).contains(shapely.Point(x, z))
         assert fields.height_min_m <= y - room.floor_y <= fields.height_max_m

@@ -61,19 +61,19 @@ def test_a_users_file_gives_cameras_by_look_or_by_matrix() -> None:
     assert (room, no_room) == ("0_1", None)
 
 
-def test_each_camera_has_its_own_k_and_may_have_opencvs_axes() -> None:
+def test_each_camera_has_its_k_and_may_use_opencvs_axes() -> None:
     text = """[
       {"world_from_camera_opencv": [[1,0,0,1],[0,-1,0,1.5],[0,0,-1,2],[0,0,0,1]],
        "K": [[600,0,650],[0,610,350],[0,0,1]], "width_px": 1280, "height_px": 720},
       {"world_from_camera": [[1,0,0,1],[0,1,0,1.5],[0,0,1,2],[0,0,0,1]], "hfov_rad": 1.0}
     ]"""
-    (own, _), (other, _) = cameras_from_file_text(text, "cams.json", 640, 480)
-    np.testing.assert_allclose(own.world_from_camera, other.world_from_camera, atol=1e-12)
-    # A point falls where K of the whole picture says, at whatever size it is drawn.
+    (first, _), (second, _) = cameras_from_file_text(text, "cams.json", 640, 480)
+    np.testing.assert_allclose(first.world_from_camera, second.world_from_camera, atol=1e-12)
+    # A point projects to the place given by K of the whole picture, for any drawn size.
     point = np.array([[1.2, 1.6, 0.0]])
-    x, y = own.with_size(1280, 720).pixels_of(point)[0]
+    x, y = first.with_size(1280, 720).pixels_of(point)[0]
     assert (x, y) == pytest.approx((650 + 600 * 0.2 / 2, 350 - 610 * 0.1 / 2))
-    assert own.intrinsics.fx != other.intrinsics.fx
+    assert first.intrinsics.fx != second.intrinsics.fx
 
 
 @pytest.mark.parametrize(
@@ -101,7 +101,7 @@ def test_a_users_file_that_gives_no_pose_is_rejected(text: str) -> None:
         cameras_from_file_text(text, "cams.json", 320, 240)
 
 
-def test_stored_cameras_become_views_of_the_rooms_they_stand_in() -> None:
+def test_stored_cameras_become_views_of_their_rooms() -> None:
     house = builtin_home()
     views, notes = stored_views(house, QUICK, counter_of(house))
     assert not notes
@@ -113,13 +113,15 @@ def test_stored_cameras_become_views_of_the_rooms_they_stand_in() -> None:
     assert len({v.id for v in views}) == 2
 
 
-def test_the_room_of_a_published_camera_is_the_one_its_name_says() -> None:
+def test_the_name_of_a_published_camera_gives_its_room() -> None:
     text = with_names(f"{LINE}\n\n{LINE}\n", "Room#0_1_2\nRoom#9_9_0\n", "names")
-    given = cameras_from_file_text(text, "room_camera.txt", 640, 480)
-    assert [room for _, room in given] == ["0_1", "9_9"]
+    published = cameras_from_file_text(text, "room_camera.txt", 640, 480)
+    assert [room for _, room in published] == ["0_1", "9_9"]
     house = builtin_home()
     x, _, z = house.rooms[0].polygon.mean(0)[[0, 0, 1]]
-    inside = replace(given[0][0], world_from_camera=moved(given[0][0].world_from_camera, x, z))
+    inside = replace(
+        published[0][0], world_from_camera=moved(published[0][0].world_from_camera, x, z)
+    )
     views = views_from_cameras(
         house, [(inside, "0_1"), (inside, "9_9")], QUICK, counter_of(house), origin="file"
     )
@@ -129,14 +131,14 @@ def test_the_room_of_a_published_camera_is_the_one_its_name_says() -> None:
 
 
 def moved(world_from_camera: np.ndarray, x: float, z: float) -> np.ndarray:
-    """The pose with its eye at x, z."""
+    """The pose with its eye moved to x, z."""
     pose = world_from_camera.copy()
     pose[[0, 2], 3] = x, z
     return pose
 
 
 @pytest.mark.parametrize("text", ["[" + "{}," * 10_001 + "{}]", "1 2 3\n" * 10_001])
-def test_a_file_of_too_many_cameras_is_rejected_before_one_is_built(text: str) -> None:
+def test_a_file_of_too_many_cameras_is_rejected_before_any_is_built(text: str) -> None:
     with pytest.raises(BadInput, match="at most 10000 are read"):
         cameras_from_file_text(text, "mine", 64, 48)
 

@@ -24,7 +24,7 @@ def test_the_map_shows_every_candidate_and_every_winner_in_its_colour() -> None:
     dots = [e.get("fill") for e in tree.iter(f"{SVG}circle")]
     tally = np.bincount(sampling.traces[0].verdict, minlength=len(Verdict))
     for verdict in Verdict:
-        assert dots.count(COLOURS[verdict]) == tally[verdict] + 1  # one in the legend
+        assert dots.count(COLOURS[verdict]) == tally[verdict] + 1  # plus one in the legend
     titles = [e.text or "" for e in tree.iter(f"{SVG}title")]
     for view in sampling.views:
         assert any(title.startswith(f"{view.id}: score") for title in titles)

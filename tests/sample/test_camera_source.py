@@ -1,4 +1,4 @@
-"""The table of camera sources: its entries, its page, and a source that is added in one file."""
+"""The table of camera sources: entries, docs, and a source added in one file."""
 
 from __future__ import annotations
 

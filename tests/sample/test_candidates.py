@@ -1,4 +1,4 @@
-"""Candidates: one per cell and sector, uniform, and independent of everything but their names."""
+"""Candidates: one per cell and sector, uniform, and dependent only on their names."""
 
 import numpy as np
 import pytest
@@ -12,7 +12,7 @@ GRID = Grid(-1.0, 2.0, 4.0, 6.0, base_y=3.0)
 FIELDS = CameraFields()
 
 
-def test_each_cell_has_one_candidate_in_each_sector_and_it_lies_in_both() -> None:
+def test_each_cell_has_one_candidate_in_each_sector_inside_both() -> None:
     c = grid_candidates(GRID, FIELDS, (0, "house", "room"))
     assert len(c) == 6 * 20 * 16
     assert len(
@@ -59,11 +59,13 @@ def test_a_cell_keeps_its_candidate_when_the_grid_grows() -> None:
     wider = Grid(GRID.x_min, GRID.z_min, GRID.x_max + 3, GRID.z_max + 2, GRID.base_y)
     small = grid_candidates(GRID, FIELDS, (0, "h", "r"))
     large = grid_candidates(wider, FIELDS, (0, "h", "r"))
-    at = {
+    positions = {
         (*c, s): k
         for k, (c, s) in enumerate(zip(large.cell.tolist(), large.sector.tolist(), strict=True))
     }
-    same = [at[(*c, s)] for c, s in zip(small.cell.tolist(), small.sector.tolist(), strict=True)]
+    same = [
+        positions[(*c, s)] for c, s in zip(small.cell.tolist(), small.sector.tolist(), strict=True)
+    ]
     np.testing.assert_array_equal(large.eye[same], small.eye)
     np.testing.assert_array_equal(large.towards[same], small.towards)
 
@@ -74,7 +76,7 @@ def test_seed_house_and_room_each_change_every_candidate(other: tuple[int, str, 
     assert (a.eye != b.eye).all()
 
 
-def test_a_spread_of_tilts_is_normal_about_the_given_one_and_moves_nothing_else() -> None:
+def test_a_spread_of_tilts_is_normal_and_changes_nothing_else() -> None:
     spread = FIELDS.model_copy(update={"tilt_deg": 8.0, "tilt_sd_deg": 5.0})
     fixed, c = (grid_candidates(GRID, f, (0, "h", "r")) for f in (FIELDS, spread))
     tilt = np.rad2deg(np.arcsin(-c.towards[:, 1]))
@@ -97,7 +99,8 @@ def test_a_spread_of_rolls_turns_cameras_about_their_axis_and_moves_nothing_else
     assert stats.kstest(roll[inside], stats.truncnorm(-1.975, 1.975, 0, 4).cdf).pvalue > 1e-3
     np.testing.assert_array_equal(c.eye, fixed.eye)
     np.testing.assert_array_equal(c.towards, fixed.towards)
-    # Clockwise by r degrees: the horizon falls to the right, so the camera's right points down.
+    # A clockwise roll by r degrees: the horizon falls to the right, so the camera's right points
+    # down.
     number = np.array([int(np.argmax(c.roll))])
     level, turned = (x.cameras(number, Intrinsics.from_hfov(64, 48))[0] for x in (fixed, c))
     a, b = level.world_from_camera, turned.world_from_camera

@@ -16,15 +16,15 @@ def test_points_are_near_exactly_when_the_nearest_triangle_is(seed: int, reach: 
     g = soup(40, seed)
     points = np.random.default_rng(seed).uniform(-3, 3, (60, 3))
     triangles = g.positions[g.faces].astype(np.float64)
-    every = [
+    distances = [
         np.linalg.norm(
             trimesh.triangles.closest_point(triangles, np.broadcast_to(p, (40, 3))) - p, axis=1
         ).min()
         for p in points
     ]
     near = near_any_triangle(points, g, reach)
-    decided = np.abs(np.array(every) - reach) > 1e-9
-    np.testing.assert_array_equal(near[decided], (np.array(every) <= reach)[decided])
+    decided = np.abs(np.array(distances) - reach) > 1e-9
+    np.testing.assert_array_equal(near[decided], (np.array(distances) <= reach)[decided])
 
 
 def test_no_clearance_or_no_triangle_means_nothing_is_near() -> None:

@@ -1,4 +1,4 @@
-"""The distance of what views show to what photographs show, in closed form."""
+"""The distance between the contents of views and of photographs, in closed form."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ PHOTOGRAPHS = np.array([NYUV2_SHARES.get(name, 0.0) for name in NYU13_NAMES])
 
 
 def only(name: str) -> F64:
-    """Pictures of one class alone."""
+    """Pictures with a single class."""
     return np.eye(len(NYU13_NAMES))[NYU13_NAMES.index(name)]
 
 
@@ -31,11 +31,11 @@ def test_a_class_that_no_photograph_shows_is_as_far_as_can_be() -> None:
     assert share_distance(np.zeros(len(NYU13_NAMES))) == 2
 
 
-def test_the_distance_of_bare_walls_is_twice_what_photographs_show_beside() -> None:
+def test_the_distance_of_bare_walls_is_twice_the_other_classes_of_photographs() -> None:
     wall = NYUV2_SHARES["wall"] / sum(NYUV2_SHARES.values())
     assert share_distance(only("wall")) == pytest.approx(2 * (1 - wall))
 
 
-def test_each_row_has_a_distance_of_its_own() -> None:
+def test_each_row_has_a_separate_distance() -> None:
     rows = np.stack([PHOTOGRAPHS, only("wall"), only("floor")])
     assert share_distance(rows) == pytest.approx([float(share_distance(row)) for row in rows])

@@ -22,7 +22,7 @@ def test_the_twice_subdivided_icosahedron_has_162_vertices_on_the_unit_sphere() 
     np.testing.assert_allclose(vertices.sum(0), 0, atol=1e-12)
 
 
-def test_each_camera_stands_on_a_vertex_at_the_papers_distance_and_looks_at_the_centre() -> None:
+def test_each_camera_is_on_a_vertex_at_the_papers_distance_and_faces_the_centre() -> None:
     views = object_views(BOX, INTRINSICS, 0, ("chair",), 200)
     centre, diagonal = BOX.mean(0), np.linalg.norm(BOX[1] - BOX[0])
     vertices = icosphere_vertices(2)

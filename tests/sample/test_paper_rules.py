@@ -16,12 +16,12 @@ from pbrs_farm.sample.camera_report import Verdict
 from pbrs_farm.sample.eye_probes import enclosed
 from pbrs_farm.sample.house_sampler import sample_cameras
 from tests.hypothesis_profiles import examples
-from tests.inputs.camera_rules import hold_the_rules
+from tests.inputs.camera_rules import assert_rules
 from tests.sample.sampled_rooms import QUICK, box, counter_of, furnished, room_house, shell
 
 
 def test_winners_of_the_builtin_home_keep_every_rule() -> None:
-    assert hold_the_rules(builtin_home(), QUICK, 0) >= 8
+    assert assert_rules(builtin_home(), QUICK, 0) >= 8
 
 
 @settings(max_examples=examples(6), deadline=None, suppress_health_check=list(HealthCheck))
@@ -29,7 +29,7 @@ def test_winners_of_the_builtin_home_keep_every_rule() -> None:
 def test_winners_of_any_furnished_room_keep_every_rule(
     width: float, depth: float, seed: int
 ) -> None:
-    hold_the_rules(furnished(width, depth), QUICK, seed)
+    assert_rules(furnished(width, depth), QUICK, seed)
 
 
 def test_no_candidate_inside_a_wardrobe_is_kept() -> None:
@@ -47,16 +47,16 @@ def test_no_candidate_inside_a_wardrobe_is_kept() -> None:
 def test_only_eyes_that_a_box_holds_are_looked_around_from() -> None:
     house = furnished()
     count, wardrobe = counter_of(house), house.items[-1].bounds.mean(0)
-    seen: list[int] = []
+    n_boxes: list[int] = []
 
     def watched(cameras: Sequence[Camera]) -> NDArray[np.uint32]:
-        seen.append(len(cameras))
+        n_boxes.append(len(cameras))
         return count(cameras)
 
     free = np.array([[1.0, 1.5, 1.0], [1.5, 1.5, 1.0]])
     eyes = np.concatenate([free[:1], wardrobe[None], free[1:]])
     assert enclosed(house, eyes, watched).tolist() == [False, True, False]
-    assert seen == [6]  # the faces of one cube
+    assert n_boxes == [6]  # the faces of one cube
 
 
 def test_no_candidate_inside_a_thick_wall_that_the_room_overlaps_is_kept() -> None:
@@ -91,7 +91,7 @@ def test_a_view_of_two_objects_is_refused_and_of_three_is_kept() -> None:
     assert views(3) >= 1
 
 
-def test_a_room_nothing_lights_gets_no_camera_and_says_so() -> None:
+def test_an_unlit_room_gets_no_camera_with_a_reason() -> None:
     house = room_house(furnished().items, 4, 5, lit_by=())
     sampling = sample_cameras(house, QUICK, 0, counter_of(house))
     assert not sampling.views
@@ -99,7 +99,7 @@ def test_a_room_nothing_lights_gets_no_camera_and_says_so() -> None:
 
 
 @pytest.mark.parametrize("corners", [0, 2, 4])
-def test_a_room_whose_polygon_has_no_area_gets_no_camera_and_says_so(corners: int) -> None:
+def test_a_room_without_area_gets_no_camera_with_a_reason(corners: int) -> None:
     flat = np.stack([np.linspace(0, 3, corners), np.zeros(corners)], axis=1)
     house = room_house(furnished().items, 4, 5, polygon=flat)
     sampling = sample_cameras(house, QUICK, 0, counter_of(house))
@@ -126,12 +126,12 @@ def test_every_candidate_is_counted_once() -> None:
 
 def test_the_other_rooms_do_not_change_a_rooms_views() -> None:
     house = builtin_home()
-    both = sample_cameras(house, QUICK, 0, counter_of(house)).views
+    together = sample_cameras(house, QUICK, 0, counter_of(house)).views
     alone = replace(house, rooms=house.rooms[1:])
     views = sample_cameras(alone, QUICK, 0, counter_of(alone)).views
-    kept = [v for v in both if v.room_id == "0_1"]
-    assert [v.id for v in views] == [v.id for v in kept]
-    for a, b in zip(views, kept, strict=True):
+    of_room = [v for v in together if v.room_id == "0_1"]
+    assert [v.id for v in views] == [v.id for v in of_room]
+    for a, b in zip(views, of_room, strict=True):
         np.testing.assert_array_equal(a.camera.world_from_camera, b.camera.world_from_camera)
 
 

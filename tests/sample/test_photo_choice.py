@@ -1,4 +1,4 @@
-"""The choice of a home's views: the best of each sector, and together like photographs."""
+"""The choice of a home's views: the best of each sector, jointly similar to photographs."""
 
 from __future__ import annotations
 
@@ -41,7 +41,7 @@ def room(
 ) -> RoomCandidates:
     """A room of candidates (sector, score, shares), each 10 m from the next: no twins.
 
-    framing, foreground: what those of the first candidate cost.
+    framing, foreground: penalties of the first candidate.
     """
     n = len(rows)
     eye = np.stack([10.0 * np.arange(n), np.full(n, 1.5), np.full(n, float(int(name[-1])))], 1)
@@ -73,7 +73,7 @@ def chosen(*rooms: RoomCandidates, **fields: object) -> dict[tuple[str, int], li
     return PhotoChoice(FIELDS.model_copy(update=fields), lens, depth_of).choose(rooms)
 
 
-def test_of_equal_views_the_one_like_photographs_is_chosen() -> None:
+def test_of_equal_views_the_most_photographic_is_chosen() -> None:
     rows = [(0, 1.05, WALLS), (0, 1.0, LIKE_ALL)]
     assert chosen(room(rows), likeness=2.0) == {("0_0", 0): [1]}
 
@@ -84,28 +84,29 @@ def test_without_likeness_the_best_score_is_chosen() -> None:
     assert scored.verdict.tolist() == [Verdict.WINNER, Verdict.LOWER_SCORE]
 
 
-def test_a_much_better_view_is_taken_whatever_it_shows() -> None:
+def test_a_much_better_view_is_taken_despite_its_contents() -> None:
     rows = [(0, 1.3, WALLS), (0, 1.3 - MOST_WORSE - 0.01, LIKE_ALL)]
     assert chosen(room(rows), likeness=50.0) == {("0_0", 0): [0]}
 
 
-def test_views_make_up_for_one_another_across_rooms() -> None:
-    # The first room can show walls and floor alone; the second, floor or what is missing.
+def test_views_complement_each_other_across_rooms() -> None:
+    # The first room can show only walls and floor; the second, floor or the missing classes.
     missing = {k: v for k, v in PHOTOGRAPH.items() if k not in ("wall", "floor")}
     first = room([(0, 1.2, shows(wall=PHOTOGRAPH["wall"], floor=PHOTOGRAPH["floor"]))])
     second = room([(0, 1.1, LIKE_ALL), (0, 1.1, shows(**missing))], "0_1")
-    found = chosen(first, second, likeness=2.0)
-    assert found["0_1", 0] == [1]
+    pair = chosen(first, second, likeness=2.0)
+    assert pair["0_1", 0] == [1]
 
 
 def test_an_early_choice_is_exchanged_when_later_views_change_the_whole() -> None:
-    # Alone the first sector is best like a photograph; beside two views of walls, without them.
+    # Alone, the first sector's best view resembles a photograph; beside two views of walls, one
+    # without walls does.
     no_wall = {k: v for k, v in PHOTOGRAPH.items() if k != "wall"}
     rows = [(0, 1.3, LIKE_ALL), (0, 1.3, shows(**no_wall)), (1, 1.2, WALLS), (2, 1.1, WALLS)]
     assert chosen(room(rows), likeness=2.0)["0_0", 0] == [1]
 
 
-def test_every_room_has_a_view_however_unlike_photographs() -> None:
+def test_every_room_has_a_view_even_if_unlike_photographs() -> None:
     rooms = [room([(0, 1.2, LIKE_ALL)]), room([(0, 0.3, WALLS)], "0_1")]
     assert chosen(*rooms, likeness=50.0)["0_1", 0] == [0]
 
@@ -123,17 +124,17 @@ def test_a_badly_framed_view_is_not_taken_for_its_likeness() -> None:
     assert chosen(room(rows, framing=0.3), likeness=0.0)["0_0", 0] == [0]
 
 
-def test_a_view_past_a_lampshade_yields_to_a_free_one_of_its_sector() -> None:
+def test_a_view_past_a_lampshade_yields_to_an_unobstructed_one_of_its_sector() -> None:
     rows = [(0, 1.3, LIKE_ALL), (0, 1.1, LIKE_ALL)]
     for likeness in (0.0, 2.0):
         assert chosen(room(rows), likeness=likeness)["0_0", 0] == [0]
         assert chosen(room(rows, foreground=0.3), likeness=likeness)["0_0", 0] == [1]
-    # The free one may lie below what the better score allows.
+    # The unobstructed view may be below the threshold of the better score.
     rows[1] = (0, 1.3 - MOST_WORSE - 0.05, LIKE_ALL)
     assert chosen(room(rows, foreground=1.0), likeness=2.0)["0_0", 0] == [1]
 
 
-def test_a_sector_keeps_its_view_whatever_stands_before_the_lens() -> None:
+def test_a_sector_keeps_a_view_despite_obstructions() -> None:
     rows = [(0, FIELDS.min_score, LIKE_ALL)]
     assert chosen(room(rows, foreground=3.0))["0_0", 0] == [0]
 
@@ -141,9 +142,9 @@ def test_a_sector_keeps_its_view_whatever_stands_before_the_lens() -> None:
 def test_several_views_of_a_sector_are_chosen_together() -> None:
     no_wall = {k: v for k, v in PHOTOGRAPH.items() if k != "wall"}
     rows = [(0, 1.2, LIKE_ALL), (0, 1.2, shows(**no_wall)), (0, 1.2, shows(wall=0.285))]
-    found = chosen(room(rows), likeness=2.0, per_sector=2)["0_0", 0]
-    assert len(found) == len(set(found)) == 2
-    assert share_distance(room(rows).nyu13[found].sum(0)) < 0.35
+    selected = chosen(room(rows), likeness=2.0, per_sector=2)["0_0", 0]
+    assert len(selected) == len(set(selected)) == 2
+    assert share_distance(room(rows).nyu13[selected].sum(0)) < 0.35
 
 
 def test_the_choice_is_the_same_every_time() -> None:

@@ -1,4 +1,4 @@
-"""The preset `photo`: what its score prefers, and that no two views show the same."""
+"""The preset `photo`: preferences of its score, and no two similar views."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def sampled(house: House, **fields: object) -> Sampling:
 
 
 def with_classes(house: House) -> House:
-    """The furnished room with the classes its names say."""
+    """The furnished room with the classes of its items' names."""
     nyu40 = {"table": 7, "chair": 5, "cupboard": 3, "bed": 4, "wardrobe": 3}
     kinds = {ItemKind.WALL: 1, ItemKind.FLOOR: 2, ItemKind.CEILING: 22}
     return house.with_items(
@@ -59,7 +59,7 @@ def with_classes(house: House) -> House:
 
 
 def shares(**changes: float) -> PhotoShares:
-    """A good view of one room, but for what is changed."""
+    """A good view of one room with some shares changed."""
     plain = {
         "furniture": 0.4, "opening": 0.05, "largest": 0.2, "wall": 0.3, "floor": 0.1,
         "n_objects": 5, "n_classes": 6, "median_m": 2.5, "cut": 0.0,
@@ -80,7 +80,7 @@ def test_a_view_is_worth_less(worse: dict[str, float]) -> None:
     assert photo_score(shares(**worse))[0] < photo_score(shares())[0]
 
 
-def test_steep_and_close_views_cost_where_likeness_counts() -> None:
+def test_steep_and_close_views_cost_if_likeness_counts() -> None:
     def cost(tilt_deg: float = 10.0, **changes: float) -> float:
         return float(framing_cost(shares(**changes), np.array([tilt_deg]))[0])
 
@@ -90,7 +90,7 @@ def test_steep_and_close_views_cost_where_likeness_counts() -> None:
     assert cost(median_m=1.4) == pytest.approx(0.4)
 
 
-def test_what_stands_before_the_lens_costs_the_more_the_nearer_it_is() -> None:
+def test_objects_before_the_lens_cost_more_the_nearer_they_are() -> None:
     house = room_house([box((0, 0, 0), (1, 1, 1)), *shell(3, 3)], 3, 3)
     counts = np.ones((5, len(house.items) + 1), np.uint32)
     # A hundred pixels each: ten of them far, at 1 m, at 0.7 m, at 0.5 m, and all but one at 0.5 m.
@@ -130,11 +130,11 @@ def test_shares_are_those_of_the_pixels() -> None:
     counts = np.zeros((1, len(house.items) + 1), np.uint32)
     counts[0, :5] = 10, 30, 20, 0, 40  # nothing, chair, floor, ceiling, a wall
     depth = np.array([[0, 1, 2, 3]], np.float32)
-    seen = photo_shares(counts, depth, item_roles(house), 0.01)
-    assert (seen.furniture[0], seen.floor[0], seen.wall[0]) == (0.3, 0.2, 0.4)
-    assert (seen.n_objects[0], seen.n_classes[0], seen.median_m[0]) == (1, 1, 2.0)
-    assert seen.nyu13[0, NYU13_NAMES.index("chair")] == 0.3
-    assert seen.nyu13[0].sum() == pytest.approx(1)
+    rows = photo_shares(counts, depth, item_roles(house), 0.01)
+    assert (rows.furniture[0], rows.floor[0], rows.wall[0]) == (0.3, 0.2, 0.4)
+    assert (rows.n_objects[0], rows.n_classes[0], rows.median_m[0]) == (1, 1, 2.0)
+    assert rows.nyu13[0, NYU13_NAMES.index("chair")] == 0.3
+    assert rows.nyu13[0].sum() == pytest.approx(1)
     assert photo_shares(counts, depth / 2, item_roles(house), 0.01).foreground[0].max() == 0.25
     # Without a candidate there are no shares, and no warning (warnings are errors here).
     none = photo_shares(counts[:0], np.zeros((0, 0), np.float32), item_roles(house), 0.01)
@@ -147,8 +147,8 @@ def test_a_view_shares_all_with_itself_and_nothing_with_its_back() -> None:
     intrinsics = Intrinsics.from_hfov(*DEPTH_SIZE)
     eye = np.array([2.0, 1.5, 2.5])
     ahead, back, near = (
-        Camera.look(intrinsics, at, np.array(to))
-        for at, to in (
+        Camera.look(intrinsics, camera, np.array(to))
+        for camera, to in (
             (eye, (0.0, -0.2, 1.0)),
             (eye, (0.0, -0.2, -1.0)),
             (eye + np.array([0, -0.1, 0.5]), (0.0, -0.2, 1.0)),
@@ -190,30 +190,32 @@ def test_views_of_a_furnished_room_show_furniture_and_no_two_the_same() -> None:
         assert sum(view.objects.values()) > 0.1 * 80 * 60
 
 
-def test_of_views_of_one_spot_one_counts_across_rooms_too() -> None:
+def test_views_of_one_spot_count_once_across_rooms() -> None:
     house = with_classes(furnished())
     caster = Caster(geometry_from_house(house))
     sampler = PhotoSampler(
         house, FIELDS, 0, caster.item_counts, caster.item_pictures, geometry_from_house(house)
     )
-    one = sampler.room_candidates(house.rooms[0])
-    twin = replace(one, room=replace(one.room, id="0_1"), verdict=one.verdict.copy())
-    chosen = sampler.choose([one, twin])
+    candidates = sampler.room_candidates(house.rooms[0])
+    twin = replace(
+        candidates, room=replace(candidates.room, id="0_1"), verdict=candidates.verdict.copy()
+    )
+    chosen = sampler.choose([candidates, twin])
     assert any(chosen.values())
     for sector in range(FIELDS.n_sectors):
-        both = set(chosen.get(("0_0", sector), [])) & set(chosen.get(("0_1", sector), []))
-        assert not both
+        doubled = set(chosen.get(("0_0", sector), [])) & set(chosen.get(("0_1", sector), []))
+        assert not doubled
     assert (twin.verdict == Verdict.NEAR_DUPLICATE).any()
 
 
-def test_an_empty_room_has_its_best_view_alone_and_the_others_are_called_weak() -> None:
+def test_an_empty_room_has_one_view_and_the_others_are_weak() -> None:
     sampling = sampled(room_house(shell(4, 4), 4, 4), min_room_score=0.05)
     assert len(sampling.views) == 1
     assert sampling.report.refused["below_min_score"] > 0
     assert not sampled(room_house(shell(4, 4), 4, 4), min_room_score=0.5).views
 
 
-def test_a_view_must_show_as_many_objects_as_the_recipe_asks() -> None:
+def test_a_view_must_show_the_recipes_number_of_objects() -> None:
     report = sampled(room_house(shell(4, 4), 4, 4), min_objects=1).report
     assert report.n_views == 0
     assert all("few objects" in s.reason for s in report.rooms[0].sectors)
@@ -243,11 +245,11 @@ def test_few_candidates_are_looked_at_in_small_pictures_and_the_best_are_among_t
     tiny = [sampler.room_candidates(house.rooms[0])]
     few = sampler.with_better_scores(tiny)
     assert 0 < 4 * n_looks[160, 120] < n_looks[36, 27]
-    # Compare with the choice among all candidates, each looked at in a small picture.
-    left = np.flatnonzero(np.isfinite(tiny[0].score))
-    every = sampler._scored(tiny[0], left, (160, 120), DEPTH_SIZE)
-    by_all, by_few = sampler.choose([every]), sampler.choose(few)
-    score = every.score
+    # Compare with the choice among all candidates, each rendered as a small picture.
+    left_over = np.flatnonzero(np.isfinite(tiny[0].score))
+    scored = sampler.scored_from_pictures(tiny[0], left_over, (160, 120), DEPTH_SIZE)
+    by_all, by_few = sampler.choose([scored]), sampler.choose(few)
+    score = scored.score
     assert sum(map(len, by_few.values())) == sum(map(len, by_all.values())) > 2
     best = sum(score[k].sum() for k in by_all.values())
     assert sum(score[k].sum() for k in by_few.values()) >= 0.98 * best
@@ -255,11 +257,11 @@ def test_few_candidates_are_looked_at_in_small_pictures_and_the_best_are_among_t
     assert (few[0].score[numbers] == score[numbers]).all()
 
 
-def test_what_encloses_an_eye_is_found_once_for_all_rooms(monkeypatch: pytest.MonkeyPatch) -> None:
-    house, found = furnished(), list[House]()
+def test_items_around_an_eye_are_found_once_for_all_rooms(monkeypatch: pytest.MonkeyPatch) -> None:
+    house, homes_asked = furnished(), list[House]()
 
     def counted(of: House) -> EnclosureLimits:
-        found.append(of)
+        homes_asked.append(of)
         return enclosure_limits(of)
 
     monkeypatch.setattr(photo_sampler, "enclosure_limits", counted)
@@ -268,7 +270,7 @@ def test_what_encloses_an_eye_is_found_once_for_all_rooms(monkeypatch: pytest.Mo
     sampler = PhotoSampler(house, FIELDS, 0, caster.item_counts, caster.item_pictures, geometry)
     for _ in range(2):
         assert (sampler.room_candidates(house.rooms[0]).verdict == Verdict.NEAR_OBSTACLE).any()
-    assert found == [house]
+    assert homes_asked == [house]
 
 
 def test_the_same_house_and_seed_give_the_same_views() -> None:

@@ -1,4 +1,4 @@
-"""The preset that does what the published data's sampler did (docs/spec/suncg.md section 3.2)."""
+"""The preset that imitates the sampler of the published data (docs/spec/suncg.md section 3.2)."""
 
 import math
 from dataclasses import replace
@@ -42,7 +42,7 @@ def test_four_sectors_tilted_by_one_fifth_in_the_published_height_band() -> None
         (v.score for v in sampling.views), reverse=True
     )
     base = room_grid(house, house.rooms[0]).base_y
-    assert base == pytest.approx(-0.1)  # the bottom of the floor's slab, not its surface
+    assert base == pytest.approx(-0.1)  # the bottom of the floor's slab, rather than its surface
     for view in sampling.views:
         x, y, z = view.camera.towards
         assert y / math.hypot(x, z) == pytest.approx(-0.2, abs=1e-6)
@@ -58,9 +58,9 @@ def test_nothing_keeps_a_viewpoint_ten_centimetres_off_an_obstacle() -> None:
     plan = trace.candidates.eye[:, [0, 2]]
     off = np.maximum(np.maximum(low - plan, plan - high), 0)
     near = np.linalg.norm(off, axis=1)
-    kept = trace.verdict >= Verdict.FEW_OBJECTS
-    assert (kept & (near > 0.03) & (near < 0.1)).any()
-    assert not (kept & (near == 0)).any()
+    accepted = trace.verdict >= Verdict.FEW_OBJECTS
+    assert (accepted & (near > 0.03) & (near < 0.1)).any()
+    assert not (accepted & (near == 0)).any()
 
 
 def test_low_furniture_blocks_a_viewpoint_above_it() -> None:
@@ -98,7 +98,7 @@ def test_only_objects_of_the_room_count_and_neither_stairs_nor_boxes() -> None:
 
 
 @pytest.mark.parametrize("missing", ["has_floor", "has_ceiling"])
-def test_a_room_without_floor_or_ceiling_has_no_camera_and_says_so(missing: str) -> None:
+def test_a_room_without_floor_or_ceiling_has_no_camera_with_a_reason(missing: str) -> None:
     house = room_house(furnished().items, 4, 5, **{missing: False})
     sampling = sample_cameras(house, SMALL, 0, counter_of(house))
     assert not sampling.views

@@ -1,4 +1,4 @@
-"""Coarse first and full size next gives the answer of full size alone; several per sector differ."""
+"""Coarse-to-fine search equals scoring everything at full size; several views per sector differ."""
 
 import numpy as np
 import pytest
@@ -79,7 +79,7 @@ def test_several_views_of_a_sector_show_objects_the_first_does_not() -> None:
     house = furnished()
     fields = QUICK.model_copy(update={"per_sector": 3})
     sampling = sample_cameras(house, fields, 0, counter_of(house))
-    one = winners(house, QUICK, 0)
+    first_views = winners(house, QUICK, 0)
     by_sector: dict[int, list[str]] = {}
     for view in sampling.views:
         by_sector.setdefault(view.sector, []).append(view.id)
@@ -87,9 +87,11 @@ def test_several_views_of_a_sector_show_objects_the_first_does_not() -> None:
     assert len({v.id for v in sampling.views}) == len(sampling.views)
     for view in sampling.views:
         if view.id.endswith("_0"):
-            assert view.camera.world_from_camera.tobytes() == one[view.id.removesuffix("_0")]
+            assert (
+                view.camera.world_from_camera.tobytes() == first_views[view.id.removesuffix("_0")]
+            )
 
-    # A second view adds an object, or shows more of one than the first does.
+    # A second view adds an object, or shows more of one than the first.
     views = {v.id: v for v in sampling.views}
     for ids in by_sector.values():
         for second in ids[1:2]:

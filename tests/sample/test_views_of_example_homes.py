@@ -11,7 +11,7 @@ from pbrs_farm.read.sweethome3d.home import read_home
 from pbrs_farm.repair import repair
 from pbrs_farm.sample.house_sampler import sample_cameras
 from tests.example_homes import example_homes
-from tests.inputs.camera_rules import hold_the_rules
+from tests.inputs.camera_rules import assert_rules
 from tests.sample.sampled_rooms import IndependentLook
 
 pytestmark = pytest.mark.homes
@@ -42,10 +42,10 @@ def repaired(name: str) -> House:
 def test_winners_of_an_example_home_keep_every_rule(name: str, bounds: dict[str, float]) -> None:
     fields: CameraFields = recipe_from_name("paper").cameras
     fields = fields.model_copy(update={**SMALL, "coarse_height_px": 60, **bounds})
-    assert hold_the_rules(repaired(name), fields, 0) >= 10
+    assert assert_rules(repaired(name), fields, 0) >= 10
 
 
-def test_photos_of_an_example_home_show_furniture_from_where_people_stand() -> None:
+def test_photos_of_an_example_home_show_furniture_from_walkable_places() -> None:
     house = repaired("Studio")
     fields: CameraFields = recipe_from_name("fast").cameras
     fields = fields.model_copy(update={**SMALL, "coarse_height_px": 60})
@@ -58,7 +58,7 @@ def test_photos_of_an_example_home_show_furniture_from_where_people_stand() -> N
     }
     for view in sampling.views:
         room, camera = house.room(view.room_id), view.camera
-        look.hold_the_rules_of_place(room, camera, fields)
+        look.assert_rules_of_place(room, camera, fields)
         shown = sum(n for k, n in look.pixels(camera).items() if k in openings)
         n_pixels = camera.intrinsics.width_px * camera.intrinsics.height_px
         assert shown <= (fields.max_opening_fraction + 0.01) * n_pixels

@@ -1,4 +1,4 @@
-"""What a notebook shows of a home, of cameras, of frames and of a report; and progress."""
+"""Notebook displays of a home, cameras, frames and a report; and progress."""
 
 from __future__ import annotations
 
@@ -46,13 +46,15 @@ def test_a_home_shows_its_plan_with_rooms_items_and_lamps(home: pf.Home) -> None
 def test_a_plan_shows_the_cameras_it_is_given(home: pf.Home) -> None:
     cameras = home.cameras(n=3)
     shown = titles(home.plan(cameras))
-    assert all(any(title.startswith(f"{one.id}: score") for title in shown) for one in cameras)
+    assert all(
+        any(title.startswith(f"{camera.id}: score") for title in shown) for camera in cameras
+    )
     assert titles(home.plan([pf.Camera.look_at((2.5, 1.2, 2.4), (2, 0.9, 2))])) != titles(
         home.plan()
     )
 
 
-def test_viewpoints_show_what_is_seen_from_them(home: pf.Home) -> None:
+def test_viewpoints_show_their_visible_items(home: pf.Home) -> None:
     cameras = home.cameras(n=2)
     page = cameras._repr_html_()
     assert page.count("<img") == 2
@@ -77,13 +79,13 @@ def test_a_machine_without_opengl_sketches_diffuse_colours_by_rays(
     albedo = frame.layer("albedo").astype(float)
     assert (sketch <= albedo).all()
     assert (sketch >= albedo // 2).all()
-    # What faces the camera keeps its colour: there normal and ray are one line.
+    # Surfaces that face the camera keep their colour: there normal and ray are parallel.
     share = -frame.normal[..., 2]
     faces = (share > 0.99)[15:45, 20:60]
     assert np.abs(sketch - albedo)[15:45, 20:60][faces].max(initial=0) < 12
 
 
-def test_viewpoints_show_where_they_are_without_opengl(
+def test_viewpoints_are_drawn_without_opengl(
     home: pf.Home, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     def fail(*_words: object) -> None:
@@ -115,14 +117,14 @@ def test_a_repair_report_is_shown_in_words(home: pf.Home) -> None:
 
 
 @pytest.mark.long
-def test_progress_is_told_in_lines_where_there_is_no_terminal(
+def test_without_a_terminal_progress_is_printed_in_lines(
     home: pf.Home, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     cameras = home.cameras(n=2)
     heard: list[str] = []
     pf.render(home, cameras, modes=["opengl_dl"], progress=True, observe=heard.append)
-    said = capsys.readouterr().out
-    assert heard == [one.id for one in cameras]
-    assert re.search(rf"{cameras[1].id}: [\d.]+ s; 2 of 2", said)
+    output = capsys.readouterr().out
+    assert heard == [camera.id for camera in cameras]
+    assert re.search(rf"{cameras[1].id}: [\d.]+ s; 2 of 2", output)
     pf.render_homes([home], tmp_path / "x", views=1, modes=["opengl_dl"], progress=True)
     assert "1 of 1" in capsys.readouterr().out

@@ -1,4 +1,4 @@
-"""Things that fall in a home: by Galileo's law until they meet something, then at rest, and told where not."""
+"""Falling items in a home: free fall until contact, then rest, and errors otherwise."""
 
 from __future__ import annotations
 
@@ -12,28 +12,28 @@ from pbrs_farm.check import verify
 from pbrs_farm.core.errors import BadInput
 from tests.scene.homes import can, crate, small_home
 
-AT = (2.6, 1.2, 2.0)  # above the floor of the living room, where nothing stands
+AT = (2.6, 1.2, 2.0)  # above an empty part of the living room's floor
 
 
 @pytest.fixture(scope="module")
-def held(tmp_path_factory: pytest.TempPathFactory) -> pf.Home:
-    """A crate in the air."""
+def floating_home(tmp_path_factory: pytest.TempPathFactory) -> pf.Home:
+    """A home with a crate in the air."""
     return small_home().place(crate(tmp_path_factory.mktemp("models")), at=AT)
 
 
 @pytest.fixture(scope="module")
-def falling(held: pf.Home) -> pf.Home:
-    return held.drop("crate 1", from_s=0.5)
+def falling(floating_home: pf.Home) -> pf.Home:
+    return floating_home.drop("crate 1", from_s=0.5)
 
 
 def bounds(home: pf.Home, time_s: float, name: str = "crate 1") -> np.ndarray:
     return home.at(time_s).items[name].bounds
 
 
-def test_a_thing_falls_by_half_g_t_squared_and_lies_on_the_floor(
-    held: pf.Home, falling: pf.Home
+def test_an_item_falls_by_half_g_t_squared_and_rests_on_the_floor(
+    floating_home: pf.Home, falling: pf.Home
 ) -> None:
-    rest = held.items["crate 1"].bounds
+    rest = floating_home.items["crate 1"].bounds
     for time_s in (0.0, 0.5):
         assert bounds(falling, time_s) == pytest.approx(rest, abs=1e-6)
     for fallen_s in (0.1, 0.2, 0.3, 0.4):
@@ -41,15 +41,15 @@ def test_a_thing_falls_by_half_g_t_squared_and_lies_on_the_floor(
         # Steps of 2 ms are half a step ahead.
         assert drop == pytest.approx(9.81 / 2 * fallen_s**2, abs=0.001 * 9.81 * fallen_s + 1e-3)
     end = bounds(falling, 99.0)
-    # It lies on the rug.
-    assert end[0, 1] == pytest.approx(held.items["rug"].bounds[1, 1], abs=0.006)
+    # It rests on the rug.
+    assert end[0, 1] == pytest.approx(floating_home.items["rug"].bounds[1, 1], abs=0.006)
     assert np.linalg.norm(end[1] - end[0]) == pytest.approx(
         np.linalg.norm(rest[1] - rest[0]), abs=0.1
     )
 
 
-def test_a_push_and_a_spin_are_what_is_given(held: pf.Home) -> None:
-    pushed = held.drop("crate 1", push=(0.5, 0, -0.25), spin=(0, 3.0, 0))
+def test_a_push_and_a_spin_have_their_given_values(floating_home: pf.Home) -> None:
+    pushed = floating_home.drop("crate 1", push=(0.5, 0, -0.25), spin=(0, 3.0, 0))
     before, after = bounds(pushed, 0.0).mean(0), bounds(pushed, 0.2).mean(0)
     assert (after - before)[[0, 2]] == pytest.approx([0.1, -0.05], abs=2e-3)
     (motion,) = pushed.house.motions
@@ -57,7 +57,7 @@ def test_a_push_and_a_spin_are_what_is_given(held: pf.Home) -> None:
     assert np.arctan2(turn[0, 2], turn[0, 0]) == pytest.approx(0.6, abs=0.01)
 
 
-def test_what_stands_on_a_table_stays_and_falls_when_it_is_pushed_off(tmp_path: Path) -> None:
+def test_an_item_on_a_table_stays_and_falls_when_pushed_off(tmp_path: Path) -> None:
     home = small_home().place(can(tmp_path), on="dining table", seed=1)
     rest = home.items["can 1"].bounds
     assert bounds(home.drop("can 1"), 9.0, "can 1") == pytest.approx(rest, abs=0.008)
@@ -65,9 +65,9 @@ def test_what_stands_on_a_table_stays_and_falls_when_it_is_pushed_off(tmp_path: 
     assert bounds(off, 9.0, "can 1")[0, 1] == pytest.approx(0.0, abs=0.02)
 
 
-def test_a_fall_travels_with_the_home(falling: pf.Home, held: pf.Home) -> None:
-    assert falling.id != held.id
-    assert held.drop("crate 1", from_s=0.5).id == falling.id
+def test_a_fall_travels_with_the_home(falling: pf.Home, floating_home: pf.Home) -> None:
+    assert falling.id != floating_home.id
+    assert floating_home.drop("crate 1", from_s=0.5).id == falling.id
     with pytest.raises(BadInput, match="has recorded motion"):
         falling.move("crate 1", by=(0.1, 0, 0))
     assert len(falling.without("crate 1").motions) == 0
@@ -75,16 +75,16 @@ def test_a_fall_travels_with_the_home(falling: pf.Home, held: pf.Home) -> None:
 
 
 @pytest.mark.long
-def test_what_does_not_rest_flies_off_or_begins_inside_is_named(
-    held: pf.Home, tmp_path: Path
+def test_restless_flying_and_overlapping_items_are_named(
+    floating_home: pf.Home, tmp_path: Path
 ) -> None:
     with pytest.raises(BadInput, match=r"crate 1.*still moves after 0.2 s"):
-        held.drop("crate 1", seconds=0.2)
+        floating_home.drop("crate 1", seconds=0.2)
     with pytest.raises(BadInput, match="drop: push: expected at most 50 m/s"):
-        held.drop("crate 1", push=(0, 500, 0))
-    table = held.items["dining table"].bounds
+        floating_home.drop("crate 1", push=(0, 500, 0))
+    table = floating_home.items["dining table"].bounds
     x, _y, z = table.mean(0)
-    inside = held.place(can(tmp_path), at=(x, table[1, 1] - 0.06, z))
+    inside = floating_home.place(can(tmp_path), at=(x, table[1, 1] - 0.06, z))
     with pytest.raises(BadInput, match=r"can 1: starts \d+ mm inside dining table"):
         inside.drop("can 1")
 
@@ -103,8 +103,8 @@ def test_a_film_of_a_fall_has_labels_that_verify_finds_right(
         modes=[],
         layers=["flow_forward", "scene_flow", "nocs"],
     )
-    seen = [f.mask("crate 1").sum() for f in frames]
-    assert min(seen) > 30
+    n_pixels = [f.mask("crate 1").sum() for f in frames]
+    assert min(n_pixels) > 30
     assert {
         f.instances.column("id")[f.instances.column("item").index("crate 1")] for f in frames
     } == {len(falling.house.items)}

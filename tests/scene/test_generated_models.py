@@ -67,7 +67,7 @@ def test_a_thing_stands_in_a_home() -> None:
         ({"name": "toilet", "lid": 1}, "toilet: has no parameter 'lid'"),
     ],
 )
-def test_what_does_not_fit_is_one_clear_error(call: dict[str, Any], error: str) -> None:
+def test_impossible_parameters_are_one_clear_error(call: dict[str, Any], error: str) -> None:
     with pytest.raises(pf.BadInput, match=error):
         pf.generate_model(**call)
 

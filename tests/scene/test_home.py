@@ -1,4 +1,4 @@
-"""A home in Python: looked at, changed as a value, told what is wrong."""
+"""A home in Python: inspected, changed as a value, and clear about errors."""
 
 from __future__ import annotations
 
@@ -25,8 +25,8 @@ def home() -> pf.Home:
 
 
 def item(home: pf.Home, name: str) -> Item:
-    found: Item = home.items[name]
-    return found
+    match: Item = home.items[name]
+    return match
 
 
 def test_importing_the_package_loads_nothing_else() -> None:
@@ -56,20 +56,20 @@ def test_rooms_and_items_are_tables(home: pf.Home) -> None:
     ("name", "says"),
     [("sofaa", "did you mean sofa"), ("chair", '"chair 1"'), ("chair 9", "no such item")],
 )
-def test_a_name_that_is_none_is_told_with_the_nearest(home: pf.Home, name: str, says: str) -> None:
+def test_an_unknown_name_is_refused_with_the_nearest(home: pf.Home, name: str, says: str) -> None:
     with pytest.raises(BadInput, match=says):
         home.items[name]
     with pytest.raises(BadInput, match="did you mean Bedroom"):
         home.rooms["Bedrom"]
 
 
-def test_a_change_is_a_new_home_with_an_id_of_its_own(home: pf.Home) -> None:
+def test_a_change_is_a_new_home_with_a_new_id(home: pf.Home) -> None:
     bare = home.without("sofa")
     assert bare.id == home.without("sofa").id
     assert bare.id.startswith(f"{home.id}-e")
     assert bare.id != home.without("bed").id
     assert len(bare.items) == len(home.items) - 1
-    assert len(home.items) == 37  # what lies before its windows is no part of it
+    assert len(home.items) == 37  # outdoor surroundings are not items of the home
     assert bare.without("bed").source.unedited == home.source
 
 
@@ -80,19 +80,19 @@ def test_whatever_is_removed_all_others_keep_their_instance_ids(
     def ids(of: pf.Home) -> dict[str, int]:
         return {row["id"]: row["instance"] for row in of.items}
 
-    both = home.place(can(tmp_path), at=(2, 0, 2)).place(crate(tmp_path), at=(1, 0, 2))
-    bare = both.without(["sofa", "can 1"])
-    gone = {both.items["sofa"].id, "can 1"}
-    assert ids(bare) == {key: k for key, k in ids(both).items() if key not in gone}
-    # The name is free again; the thing that takes it is another instance.
+    with_both = home.place(can(tmp_path), at=(2, 0, 2)).place(crate(tmp_path), at=(1, 0, 2))
+    bare = with_both.without(["sofa", "can 1"])
+    gone = {with_both.items["sofa"].id, "can 1"}
+    assert ids(bare) == {key: k for key, k in ids(with_both).items() if key not in gone}
+    # The name is free again; the item that takes it is another instance.
     again = bare.place(can(tmp_path), at=(2, 0, 1), name="can 1")
-    assert ids(again)["can 1"] == max(ids(both).values()) + 1
-    # Labels and the stored file have these ids, and nothing of what is gone.
+    assert ids(again)["can 1"] == max(ids(with_both).values()) + 1
+    # Labels and the stored file have these ids, and no trace of removed items.
     camera = pf.Camera.look_at((3.5, 1.6, 3.5), (1, 0, 1.5), hfov_deg=90)
-    frames = [pf.render(one, camera, modes=["opengl_dl"]) for one in (both, again)]
-    seen = [{r["name"]: r["id"] for r in f.table["instances"]} for f in frames]
-    assert seen[0]["crate"] == seen[1]["crate"]
-    assert ids(both)["crate 1"] == seen[0]["crate"]
+    frames = [pf.render(edited, camera, modes=["opengl_dl"]) for edited in (with_both, again)]
+    ids_seen = [{r["name"]: r["id"] for r in f.table["instances"]} for f in frames]
+    assert ids_seen[0]["crate"] == ids_seen[1]["crate"]
+    assert ids(with_both)["crate 1"] == ids_seen[0]["crate"]
     data = gltf_from_glb((bare.export(tmp_path / "out") / f"{bare.id}.glb").read_bytes(), "")
     rows = [node["extras"] for node in data.document["nodes"] if node.get("extras")]
     assert {row["item"]: row["instance"] for row in rows} == ids(bare)
@@ -100,7 +100,7 @@ def test_whatever_is_removed_all_others_keep_their_instance_ids(
         bare.without("sofa")
 
 
-def test_things_move_turn_and_take_their_colour(home: pf.Home, tmp_path: Path) -> None:
+def test_items_move_turn_and_take_their_colour(home: pf.Home, tmp_path: Path) -> None:
     moved = home.move("tv", by=(0.0, 0.5, 0.0), turn_deg=90)
     before, after = item(home, "tv").bounds, item(moved, "tv").bounds
     assert after.mean(0) == pytest.approx(before.mean(0) + np.array([0, 0.5, 0]), abs=1e-5)
@@ -111,8 +111,8 @@ def test_things_move_turn_and_take_their_colour(home: pf.Home, tmp_path: Path) -
         for surface in wall.surfaces:
             material = painted.house.materials[surface.material]
             assert material.diffuse == pytest.approx((0.2, 0.4, 0.6))
-    kept = painted.house.materials[item(painted, "sofa").surfaces[0].material]
-    assert kept == home.house.materials[item(home, "sofa").surfaces[0].material]
+    paint = painted.house.materials[item(painted, "sofa").surfaces[0].material]
+    assert paint == home.house.materials[item(home, "sofa").surfaces[0].material]
 
     Image.new("RGB", (8, 8), (90, 60, 30)).save(tmp_path / "wood.png")
     wooden = home.material("floor*", tmp_path / "wood.png", scale_m=0.5)
@@ -136,7 +136,7 @@ def test_lamps_are_set_and_added(home: pf.Home) -> None:
         home.light("sofa", lm=10)
 
 
-def test_a_model_stands_where_it_is_put(home: pf.Home, tmp_path: Path) -> None:
+def test_a_model_is_at_its_given_place(home: pf.Home, tmp_path: Path) -> None:
     model = can(tmp_path)
     on_table = home.place(model, on="dining table", seed=3)
     stood = item(on_table, "can 1")
@@ -161,17 +161,17 @@ def test_a_model_stands_where_it_is_put(home: pf.Home, tmp_path: Path) -> None:
         home.place(model, on="picture")
 
 
-def test_scattered_things_keep_apart(home: pf.Home, tmp_path: Path) -> None:
+def test_scattered_models_keep_apart(home: pf.Home, tmp_path: Path) -> None:
     models = [can(tmp_path), crate(tmp_path)]
-    one, again = (home.scatter(models, 12, in_="Living room", seed=5) for _ in range(2))
-    assert one.id == again.id
-    placed = [i for i in one.house.items if i.pose]
+    first, again = (home.scatter(models, 12, in_="Living room", seed=5) for _ in range(2))
+    assert first.id == again.id
+    placed = [i for i in first.house.items if i.pose]
     assert len(placed) == 12
     boxes = np.array([i.bounds for i in placed])
     for k, (low, high) in enumerate(boxes):
-        apart = (boxes[:, 0] >= high).any(1) | (boxes[:, 1] <= low).any(1)
+        is_apart = (boxes[:, 0] >= high).any(1) | (boxes[:, 1] <= low).any(1)
         # Boxes along the axes may meet where turned crates do not: then heights or outlines differ.
-        assert apart.sum() >= 8, placed[k].id
+        assert is_apart.sum() >= 8, placed[k].id
     with pytest.raises(BadInput, match="things"):
         home.scatter(models, 900, on="coffee table")
 
@@ -183,7 +183,7 @@ def test_scattered_things_keep_apart(home: pf.Home, tmp_path: Path) -> None:
         (lambda h: h.sun(elevation=120), "sun_elevation_deg"),
     ],
 )
-def test_a_field_that_is_none_is_told(home: pf.Home, change, says: str) -> None:
+def test_an_unknown_field_is_refused(home: pf.Home, change, says: str) -> None:
     with pytest.raises(BadRecipe, match=says):
         change(home)
 
@@ -215,16 +215,16 @@ def test_a_door_opens_and_shuts_and_the_old_home_stays(home: pf.Home) -> None:
     assert joint_row(home)["value"] == 0
     shut, wide = item(home, "door_inner"), item(opened, "door_inner")
     np.testing.assert_array_equal(wide.surfaces[0].positions, shut.surfaces[0].positions)
-    # The leaf's knob goes round the hinge at its own distance, by 45 degrees.
-    at = np.array(row["point"])[[0, 2]]
-    was, now = (s.surfaces[2].positions[:, [0, 2]].mean(0) - at for s in (shut, wide))
+    # The leaf's knob turns about the hinge at constant distance, by 45 degrees.
+    knob = np.array(row["point"])[[0, 2]]
+    was, now = (s.surfaces[2].positions[:, [0, 2]].mean(0) - knob for s in (shut, wide))
     assert np.linalg.norm(now) == pytest.approx(np.linalg.norm(was), abs=1e-5)
     assert was @ now == pytest.approx(was @ was * np.sqrt(0.5), abs=1e-4)
     again = item(opened.open("door_inner", 0.0), "door_inner")
     assert again.surfaces[1].positions == pytest.approx(shut.surfaces[1].positions, abs=1e-5)
 
 
-def test_a_door_stops_before_what_stands_there_and_says_so(home: pf.Home, tmp_path: Path) -> None:
+def test_a_door_stops_before_an_obstacle_with_a_warning(home: pf.Home, tmp_path: Path) -> None:
     row = joint_row(home)
     leaf = item(home, "door_inner").surfaces[1]
     points = leaf.positions.astype(np.float64)

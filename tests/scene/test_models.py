@@ -1,4 +1,4 @@
-"""Meshes of the user's own: read in metres, and refused with the file and the reason."""
+"""The user's meshes: read in metres, and refused with the file and the reason."""
 
 from __future__ import annotations
 
@@ -84,14 +84,14 @@ def test_a_model_that_changes_is_refused(tmp_path: Path) -> None:
         _ = model.shape
 
 
-def test_files_of_one_name_are_told_apart_by_their_folders(tmp_path: Path) -> None:
+def test_files_of_one_name_are_distinguished_by_their_folders(tmp_path: Path) -> None:
     for folder in ("002_can", "003_box"):
         (tmp_path / folder).mkdir()
         trimesh.creation.box((0.1, 0.1, 0.1)).export(tmp_path / folder / "textured.ply")
     assert [m.id for m in pf.models(tmp_path)] == ["002-can-textured", "003-box-textured"]
 
 
-def test_a_picture_beside_a_model_is_part_of_it(tmp_path: Path) -> None:
+def test_a_picture_next_to_a_model_is_part_of_it(tmp_path: Path) -> None:
     (tmp_path / "box.obj").write_text(
         "mtllib box.mtl\nv 0 0 0\nv 1 0 0\nv 0 1 0\nvt 0 0\nusemtl a\nf 1/1 2/1 3/1\n"
     )
@@ -142,7 +142,7 @@ WITH_A_PICTURE = {
 
 
 @pytest.mark.parametrize("write", WITH_A_PICTURE.values(), ids=WITH_A_PICTURE)
-def test_a_changed_picture_beside_a_model_changes_the_home(write, tmp_path: Path) -> None:
+def test_a_changed_picture_next_to_a_model_changes_the_home(write, tmp_path: Path) -> None:
     home, digests, ids = small_home(), set(), set()
     for colour in ("red", "blue"):
         Image.new("RGB", (4, 4), colour).save(tmp_path / "box.png")
@@ -201,7 +201,7 @@ def _two_pictures(path: Path) -> None:
         ("box.ply", _two_pictures, ["unread-part"]),
     ],
 )
-def test_what_is_missing_or_guessed_of_a_model_is_noted_without_a_traceback(
+def test_missing_and_assumed_parts_of_a_model_are_noted_without_a_traceback(
     name: str, write, kinds: list[str], tmp_path: Path, capfd: pytest.CaptureFixture[str]
 ) -> None:
     write(tmp_path / name)
@@ -214,13 +214,13 @@ def test_what_is_missing_or_guessed_of_a_model_is_noted_without_a_traceback(
     assert "Traceback" not in capfd.readouterr().err
 
 
-def test_a_picture_of_a_mesh_lies_in_its_folder(tmp_path: Path) -> None:
+def test_a_picture_of_a_mesh_is_looked_up_in_its_folder(tmp_path: Path) -> None:
     (tmp_path / "in").mkdir()
     with pytest.raises(BadInput, match="leads out of the folder"):
         pf.model(_ply(tmp_path / "in", "../outside.png"))
 
 
-def test_bad_options_are_told(tmp_path: Path) -> None:
+def test_bad_options_are_refused(tmp_path: Path) -> None:
     can(tmp_path)
     for options, says in (({"unit": "feet"}, "no such unit"), ({"up": "w"}, "no such axis")):
         with pytest.raises(BadInput, match=says):

@@ -1,4 +1,4 @@
-"""Dropped things come to rest, the same for equal seeds."""
+"""Dropped items come to rest, reproducibly for equal seeds."""
 
 from __future__ import annotations
 
@@ -13,15 +13,15 @@ from tests.scene.homes import can, crate, small_home
 
 @pytest.mark.quick(1)
 @pytest.mark.parametrize("on", ["dining table", "Bedroom"])
-def test_dropped_things_lie_on_their_support(on: str, tmp_path: Path) -> None:
+def test_dropped_items_rest_on_their_support(on: str, tmp_path: Path) -> None:
     home, models = small_home(), [can(tmp_path), crate(tmp_path)]
-    one, again = (home.scatter(models, 6, on=on, seed=1, physics=True) for _ in range(2))
-    assert one.id == again.id
-    placed = [i for i in one.house.items if i.pose]
+    first, again = (home.scatter(models, 6, on=on, seed=1, physics=True) for _ in range(2))
+    assert first.id == again.id
+    placed = [i for i in first.house.items if i.pose]
     assert len(placed) == 6
     lowest = np.array([i.bounds[0, 1] for i in placed])
     height = 0.75 if on == "dining table" else 0.0
-    # Some lie on others, none has sunk in; a thing that left the table lies on what is below it.
+    # Some are on others, none has sunk in; an item that left the table is on the surface below.
     assert (lowest > -0.001).all()
     assert (np.abs(lowest - height) < 0.001).sum() >= 3
 

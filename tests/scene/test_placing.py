@@ -1,4 +1,4 @@
-"""Where models stand: what fits is placed where it fits, whatever else is asked for beside it."""
+"""Placement of models: a model that fits is placed, whatever else is requested."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ EDGES_M = {"small": 0.04, "middle": 0.25, "large": 0.95}
 
 HEIGHTS_M = {"stool": 0.3, "table": 0.75, "floor": 0.0}
 LARGEST = {"stool": 1, "table": 2, "floor": 3, "roof": 0, "rail": 0}
-"""How many of the models, by size, have room on a target; a roof and a rail have no level top."""
+"""How many of the models, by size, fit on a target; a roof and a rail have no level top."""
 
 
 def _roof() -> Item:
@@ -83,28 +83,28 @@ targets = st.lists(st.sampled_from(sorted(LARGEST)), min_size=1, max_size=5, uni
 def test_every_model_that_fits_somewhere_is_placed_there(
     models: dict[str, pf.Model], names: list[str], on: list[str], n: int, seed: int
 ) -> None:
-    home, known = _home()
+    home, supports = _home()
     sizes = sorted(EDGES_M, key=EDGES_M.__getitem__)
     fits = {(m, t) for m in names for t in on if sizes.index(m) < LARGEST[t]}
-    asked = [models[m] for m in names], n, [known[t] for t in on], seed
+    arguments = [models[m] for m in names], n, [supports[t] for t in on], seed
     if not fits:
         says = "has space for 0 of" if any(LARGEST[t] for t in on) else "no level surface"
         with pytest.raises(BadInput, match=says):
-            scattered_poses(home, *asked)
+            scattered_poses(home, *arguments)
         return
-    placed = scattered_poses(home, *asked)
+    placed = scattered_poses(home, *arguments)
     assert len(placed) == n
     stood = [_outline(model, pose) for model, pose in placed]
     for (model, _pose), (outline, low, _high) in zip(placed, stood, strict=True):
-        at = [
+        spots = [
             t for m, t in fits
             if models[m] is model and low == pytest.approx(HEIGHTS_M[t], abs=1e-5)
         ]  # fmt: skip
-        assert len(at) == 1
-        assert _area_of(at[0]).buffer(1e-6).contains(outline)
+        assert len(spots) == 1
+        assert _area_of(spots[0]).buffer(1e-6).contains(outline)
     for k, (outline, low, high) in enumerate(stood):
-        for other, other_low, other_high in stood[:k]:
-            assert low >= other_high or other_low >= high or not outline.intersects(other)
+        for lower, other_low, other_high in stood[:k]:
+            assert low >= other_high or other_low >= high or not outline.intersects(lower)
 
 
 @given(name=st.sampled_from(sorted(EDGES_M)), on=targets, seed=st.integers(0, 1000))
@@ -113,50 +113,48 @@ def test_every_model_that_fits_somewhere_is_placed_there(
     deadline=None,
     suppress_health_check=[HealthCheck.function_scoped_fixture, HealthCheck.too_slow],
 )
-def test_one_model_finds_the_target_that_takes_it(
+def test_one_model_finds_a_target_with_space(
     models: dict[str, pf.Model], name: str, on: list[str], seed: int
 ) -> None:
-    home, known = _home()
+    home, supports = _home()
     rank = sorted(EDGES_M, key=EDGES_M.__getitem__).index(name)
     heights = [HEIGHTS_M[t] for t in on if rank < LARGEST[t]]
     if heights:
-        pose = free_pose(home, models[name], [known[t] for t in on], seed)
+        pose = free_pose(home, models[name], [supports[t] for t in on], seed)
         _hull, low, _high = _outline(models[name], pose)
         assert any(low == pytest.approx(height, abs=1e-5) for height in heights)
     else:
         with pytest.raises(BadInput, match=r"no free place for"):
-            free_pose(home, models[name], [known[t] for t in on], seed)
+            free_pose(home, models[name], [supports[t] for t in on], seed)
 
 
-def test_nothing_is_placed_on_what_stands_on_a_table_already(models: dict[str, pf.Model]) -> None:
-    home, known = _home()
+def test_nothing_is_placed_on_the_contents_of_a_table(models: dict[str, pf.Model]) -> None:
+    home, supports = _home()
     tray = solid("tray", [2.4, 0.75, 0.2], [3.4, 0.8, 1.1])
     home = house(*home.items, tray)
-    placed = scattered_poses(home, [models["middle"]], 1, [known["table"]], 1)
+    placed = scattered_poses(home, [models["middle"]], 1, [supports["table"]], 1)
     outline, _low, _high = _outline(*placed[0])
     assert outline.bounds[0] > 3.4
     with pytest.raises(BadInput, match=r"takes [1-3] of 20 things"):
-        scattered_poses(home, [models["middle"]], 20, [known["table"]], 1)
+        scattered_poses(home, [models["middle"]], 20, [supports["table"]], 1)
 
 
 @pytest.mark.parametrize("on", [["roof"], ["roof", "rail"]])
-def test_targets_without_a_level_top_are_told_with_what_to_do(
+def test_targets_without_a_level_top_are_refused_with_advice(
     models: dict[str, pf.Model], on: list[str]
 ) -> None:
-    home, known = _home()
+    home, supports = _home()
     for place in (scattered_poses, settled_poses):
         with pytest.raises(BadInput, match="no level surface: roof") as caught:
-            place(home, [models["small"]], 1, [known[t] for t in on], 0)
+            place(home, [models["small"]], 1, [supports[t] for t in on], 0)
         assert "level top" in caught.value.hint
 
 
-def test_dropped_things_pass_over_targets_without_room_for_them(
-    models: dict[str, pf.Model],
-) -> None:
-    home, known = _home()
+def test_dropped_models_skip_targets_without_space(models: dict[str, pf.Model]) -> None:
+    home, supports = _home()
     # A board 20 cm over the stool leaves no room for a middle cube above it.
     home = house(*home.items, solid("board", [0.1, 0.5, 0.1], [0.6, 0.52, 0.6]))
-    on = [known[t] for t in ("stool", "roof", "table")]
+    on = [supports[t] for t in ("stool", "roof", "table")]
     placed = settled_poses(home, [models["middle"], models["small"]], 4, on, 2)
     assert len(placed) == 4
     for model, pose in placed:
@@ -165,7 +163,7 @@ def test_dropped_things_pass_over_targets_without_room_for_them(
             assert low == pytest.approx(HEIGHTS_M["table"], abs=2e-3)
 
 
-def test_furniture_in_no_room_takes_things_too(models: dict[str, pf.Model]) -> None:
+def test_furniture_outside_rooms_is_a_target_too(models: dict[str, pf.Model]) -> None:
     home, _known = _home()
     bench = solid("bench", [6, 0, 1], [7, 0.45, 1.6])
     bench = Item("bench", "bench", ItemKind.OBJECT, "0", bench.surfaces, 40)

@@ -27,7 +27,7 @@ EXAMPLES = sorted((REPO / "examples/plugins").iterdir())
 
 @pytest.fixture(scope="module")
 def installed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
-    """The environment of a machine that has all example plugins, as pip leaves them there."""
+    """The environment of a machine with all example plugins, as installed by pip."""
     site = tmp_path_factory.mktemp("plugins") / "site"
     assert sorted(p.name for p in EXAMPLES) == sorted(GROUPS)
     for example in EXAMPLES:
@@ -47,7 +47,7 @@ def installed(tmp_path_factory: pytest.TempPathFactory) -> dict[str, str]:
 @pytest.mark.slow
 @pytest.mark.parametrize("example", EXAMPLES, ids=lambda p: p.name)
 def test_pip_installs_an_example_with_its_entry_points(example: Path, tmp_path: Path) -> None:
-    # Build from a copy: setuptools writes beside what it builds.
+    # Build from a copy: setuptools writes beside its sources.
     copy = tmp_path / "src"
     copy.mkdir()
     for file in example.glob("*.*"):
@@ -55,8 +55,8 @@ def test_pip_installs_an_example_with_its_entry_points(example: Path, tmp_path: 
     words = [sys.executable, "-m", "pip", "install", "-q", "--no-deps", "--no-build-isolation"]
     words += ["--no-index", "--target", str(tmp_path / "site"), str(copy)]
     subprocess.run(words, check=True, capture_output=True, text=True)
-    (found,) = (tmp_path / "site").glob("*.dist-info/entry_points.txt")
-    assert f"[pbrs_farm.{example.name}]" in found.read_text()
+    (entry_points,) = (tmp_path / "site").glob("*.dist-info/entry_points.txt")
+    assert f"[pbrs_farm.{example.name}]" in entry_points.read_text()
     assert all((tmp_path / "site" / file.name).exists() for file in example.glob("*.py"))
 
 
@@ -124,7 +124,7 @@ def test_a_pass_of_a_plugin_dresses_homes(installed: dict[str, str], tmp_path: P
 
 
 @pytest.mark.slow
-def test_pictures_of_a_plugin_stand_beside_the_modes(
+def test_pictures_of_a_plugin_are_beside_the_modes(
     installed: dict[str, str], tmp_path: Path
 ) -> None:
     words = ["run", "builtin", "--views", "1", "--recipe", "preview", *FIELDS]
@@ -140,7 +140,7 @@ def test_pictures_of_a_plugin_stand_beside_the_modes(
     assert "no plugin 'dawn' for pictures" in bad.stdout + bad.stderr
 
 
-def test_what_is_not_installed_is_told() -> None:
+def test_a_missing_plugin_is_reported() -> None:
     with pytest.raises(MachineFailed, match="no plugin 'kitchen' for homes is installed here"):
         plugin("homes", "kitchen")
     for word in ("plugin:kitchen", "plugin:kitchen,2..1", "plugin:a b,1", "plugin:kitchen,1,2"):

@@ -1,4 +1,4 @@
-"""Pictures in memory are those of a run, from any thread, and refused in a forked child."""
+"""Pictures in memory equal those of a run, from any thread, and are refused in a forked child."""
 
 from __future__ import annotations
 
@@ -25,9 +25,9 @@ def home() -> pf.Home:
 
 
 def files(root: Path) -> dict[str, bytes]:
-    """All but markers, which hold clocks."""
-    every = (p for p in root.rglob("*") if p.is_file() and p.parent.name != "done")
-    return {str(p.relative_to(root)): p.read_bytes() for p in every}
+    """All files but markers, which hold clocks."""
+    files_found = (p for p in root.rglob("*") if p.is_file() and p.parent.name != "done")
+    return {str(p.relative_to(root)): p.read_bytes() for p in files_found}
 
 
 @pytest.mark.long
@@ -39,7 +39,7 @@ def test_a_saved_frame_has_the_bytes_of_a_run(home: pf.Home, tmp_path: Path) -> 
     mine, theirs = files(tmp_path / "mine"), files(tmp_path / "run")
     assert mine.keys() == theirs.keys()
     assert [name for name in mine if mine[name] != theirs[name]] == []
-    # What is stored is not made again.
+    # Stored files are not made again.
     again = run_local(Run(["builtin"], str(tmp_path / "mine"), home.recipe, want))
     assert (again.n_done, again.failures) == (0, [])
 
@@ -63,20 +63,20 @@ def test_a_frame_has_pictures_labels_and_poses(home: pf.Home, tmp_path: Path) ->
 
 
 @pytest.mark.long
-def test_a_frame_has_what_its_own_call_asked_for(home: pf.Home) -> None:
-    one = home.cameras(n=1)[0]
-    rich = pf.render(home, one, modes=["opengl_dl", "opengl_il"], layers=["albedo"])
-    plain = pf.render(home, one, modes=["opengl_dl"])
+def test_a_frame_has_only_the_modes_of_its_call(home: pf.Home) -> None:
+    camera = home.cameras(n=1)[0]
+    rich = pf.render(home, camera, modes=["opengl_dl", "opengl_il"], layers=["albedo"])
+    plain = pf.render(home, camera, modes=["opengl_dl"])
     assert (rich.modes, plain.modes) == (("opengl_dl", "opengl_il"), ("opengl_dl",))
     assert ("albedo" in rich.layers, "albedo" in plain.layers) == (True, False)
-    assert pf.render(home, one, modes=[]).modes == ()
+    assert pf.render(home, camera, modes=[]).modes == ()
     assert "opengl_il" not in plain.table["modes"]
 
 
-def test_what_is_saved_twice_has_the_files_of_both(home: pf.Home, tmp_path: Path) -> None:
-    one = home.cameras(n=1)[0]
-    pf.render(home, one, modes=["opengl_dl"], layers=["albedo"]).save(tmp_path)
-    pf.render(home, one, modes=["opengl_il"], layers=["material"]).save(tmp_path)
+def test_a_frame_saved_twice_has_the_files_of_both_calls(home: pf.Home, tmp_path: Path) -> None:
+    camera = home.cameras(n=1)[0]
+    pf.render(home, camera, modes=["opengl_dl"], layers=["albedo"]).save(tmp_path)
+    pf.render(home, camera, modes=["opengl_il"], layers=["material"]).save(tmp_path)
     frame = pf.open(tmp_path)[0]
     assert frame.modes == ("opengl_dl", "opengl_il")
     assert {"albedo", "material"} <= set(frame.layers)
@@ -85,7 +85,7 @@ def test_what_is_saved_twice_has_the_files_of_both(home: pf.Home, tmp_path: Path
 
 
 @pytest.mark.long
-def test_frames_of_cameras_of_ones_own_share_a_folder(home: pf.Home, tmp_path: Path) -> None:
+def test_frames_of_custom_cameras_share_a_folder(home: pf.Home, tmp_path: Path) -> None:
     for x in (2.0, 3.0):
         camera = pf.Camera.look_at((x, 1.5, 3.5), (2, 0.8, 1), size=(64, 48))
         pf.render(home, camera).save(tmp_path)
@@ -115,18 +115,18 @@ def test_a_homes_edits_reach_the_pool_and_verify(home: pf.Home, tmp_path: Path) 
 
 def test_threads_take_turns(home: pf.Home) -> None:
     cameras = home.cameras(n=2)
-    found: dict[int, np.ndarray] = {}
+    pictures: dict[int, np.ndarray] = {}
 
     def work(k: int) -> None:
-        found[k] = pf.render(home, cameras[k % 2], modes=["opengl_dl"]).colour
+        pictures[k] = pf.render(home, cameras[k % 2], modes=["opengl_dl"]).colour
 
     threads = [threading.Thread(target=work, args=(k,)) for k in range(4)]
     for thread in threads:
         thread.start()
     for thread in threads:
         thread.join()
-    assert (found[0] == found[2]).all()
-    assert (found[1] == found[3]).all()
+    assert (pictures[0] == pictures[2]).all()
+    assert (pictures[1] == pictures[3]).all()
 
 
 _FORK = """
@@ -148,7 +148,7 @@ os.waitpid(pid, 0)
 
 
 @pytest.mark.long
-def test_a_forked_child_is_told(tmp_path: Path) -> None:
+def test_a_forked_child_is_refused(tmp_path: Path) -> None:
     done = subprocess.run(
         [sys.executable, "-c", _FORK], capture_output=True, text=True, timeout=120, cwd=Path.cwd()
     )

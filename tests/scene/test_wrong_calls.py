@@ -21,12 +21,12 @@ from pbrs_farm.views.views import Frame, Views
 from tests.scene.homes import can, small_home
 
 NAN = float("nan")
-THREE: Any = 3  # of the wrong type everywhere
+THREE: Any = 3  # a wrong type everywhere
 K = [[600.0, 0, 640], [0, 600, 480], [0, 0, 1]]  # of a picture of 1280 x 960
 
 
 @pytest.fixture(scope="module")
-def given(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
+def valid_arguments(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
     folder = tmp_path_factory.mktemp("wrong")
     home = small_home()
     model = can(folder)
@@ -38,7 +38,7 @@ def given(tmp_path_factory: pytest.TempPathFactory) -> SimpleNamespace:
 
 
 Call = Callable[[Any], object]
-# What is called, the call, and what the line says.
+# Function, call, expected message.
 WRONG: list[tuple[str, Call, str]] = [
     ("load", lambda g: pf.load(3), "load: home: expected text or a path, got 3"),
     ("load", lambda g: pf.load(None), "load: home: .*got None"),
@@ -294,17 +294,17 @@ WRONG: list[tuple[str, Call, str]] = [
     ("name", "call", "says"), WRONG, ids=[f"{k}-{w[0]}" for k, w in enumerate(WRONG)]
 )
 def test_a_wrong_call_is_one_line_that_names_the_argument(
-    given: SimpleNamespace, name: str, call: Call, says: str
+    valid_arguments: SimpleNamespace, name: str, call: Call, says: str
 ) -> None:
     with pytest.raises(pf.PbrsError, match=says) as caught:
-        call(given)
+        call(valid_arguments)
     assert "\n" not in str(caught.value)
     assert "--" not in str(caught.value)
 
 
 def _public_calls() -> set[str]:
-    """Names of all that the package gives and that takes arguments."""
-    found = {"Packing", "SampleRequest"}
+    """Names of all callables of the package with arguments."""
+    names = {"Packing", "SampleRequest"}
     for name in (
         "film",
         "load",
@@ -317,15 +317,15 @@ def _public_calls() -> set[str]:
         "render_homes",
         "export_views",
     ):
-        found.add(name)
+        names.add(name)
     for kind in (pf.Camera, pf.Home, Rooms, Items, Frame, Views, Viewpoints):
         for name, member in vars(kind).items():
             function = member.__func__ if isinstance(member, staticmethod) else member
             if name.startswith("_") or not inspect.isfunction(function):
                 continue
             if set(inspect.signature(function).parameters) - {"self"}:
-                found.add(f"{kind.__name__}.{name}")
-    return found
+                names.add(f"{kind.__name__}.{name}")
+    return names
 
 
 def test_every_public_call_has_wrong_ones_in_the_table() -> None:
@@ -342,63 +342,69 @@ WARNED: list[tuple[Call, str]] = [
 
 
 @pytest.mark.parametrize(("call", "says"), WARNED)
-def test_what_leaves_the_home_is_a_warning_at_the_call(
-    given: SimpleNamespace, call: Call, says: str
+def test_an_item_outside_the_home_is_a_warning_at_the_call(
+    valid_arguments: SimpleNamespace, call: Call, says: str
 ) -> None:
     with pytest.warns(UserWarning, match=says) as heard:
-        call(given)
-    assert [Path(one.filename).name for one in heard] == [Path(__file__).name]
+        call(valid_arguments)
+    assert [Path(warning.filename).name for warning in heard] == [Path(__file__).name]
 
 
-def test_what_is_moved_within_its_rooms_is_no_warning(given: SimpleNamespace) -> None:
+def test_an_item_moved_within_its_rooms_gives_no_warning(valid_arguments: SimpleNamespace) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        moved = given.home.move("sofa", by=(0.1, 0, 0)).place(given.model, on="dining table")
-    assert moved.items["sofa"].room_id == given.home.items["sofa"].room_id
+        moved = valid_arguments.home.move("sofa", by=(0.1, 0, 0)).place(
+            valid_arguments.model, on="dining table"
+        )
+    assert moved.items["sofa"].room_id == valid_arguments.home.items["sofa"].room_id
 
 
-def test_numbers_and_arrays_of_numpy_are_taken(given: SimpleNamespace) -> None:
-    home = given.home.place(given.model, at=np.array([2, 1, 2], np.float32), seed=np.int64(1))
+def test_numbers_and_arrays_of_numpy_are_taken(valid_arguments: SimpleNamespace) -> None:
+    home = valid_arguments.home.place(
+        valid_arguments.model, at=np.array([2, 1, 2], np.float32), seed=np.int64(1)
+    )
     assert home.items["can 1"].id == "can 1"
     assert (
         pf.Camera.look_at(np.zeros(3), np.ones(3), size=np.array([64, 48])).intrinsics.width_px
         == 64
     )
-    assert len(given.home.cameras(n=np.int64(1))) == 1
+    assert len(valid_arguments.home.cameras(n=np.int64(1))) == 1
 
 
-def test_cameras_have_the_size_of_the_recipe(given: SimpleNamespace) -> None:
-    home, size = given.home, (64, 48)
+def test_cameras_have_the_size_of_the_recipe(valid_arguments: SimpleNamespace) -> None:
+    home, size = valid_arguments.home, (64, 48)
     bare = pf.Camera.look_at((2, 1.5, 1), (2, 0.8, 3), hfov_deg=70)
     posed = pf.Camera.from_opencv(np.diag([1.0, -1, -1, 1]))
-    for one in (
+    for camera in (
         home.cameras(n=1)[0], home.cameras_around("sofa", min_visible=0.1)[0],
         home.viewpoint(bare), home.viewpoint(posed),
     ):  # fmt: skip
-        assert (one.camera.intrinsics.width_px, one.camera.intrinsics.height_px) == size
-    # The field of view is the one that was asked for, at any aspect.
+        assert (camera.camera.intrinsics.width_px, camera.camera.intrinsics.height_px) == size
+    # The field of view is the requested one at any aspect.
     wide = camera_of_recipe(bare, 100, 10).intrinsics
     assert np.degrees(2 * np.arctan(50 / wide.fx)) == pytest.approx(70)
     assert wide.fx == wide.fy
     assert pf.render(home, bare, modes=[]).size == size
-    assert pf.render(home, given.camera, modes=[], size=(32, 24)).size == (32, 24)
+    assert pf.render(home, valid_arguments.camera, modes=[], size=(32, 24)).size == (32, 24)
 
 
-def test_one_layer_and_one_mode_stand_by_themselves(given: SimpleNamespace) -> None:
-    frame = pf.render(given.home, given.camera, modes="opengl_dl", layers="albedo")
+def test_a_single_layer_or_mode_needs_no_list(valid_arguments: SimpleNamespace) -> None:
+    frame = pf.render(
+        valid_arguments.home, valid_arguments.camera, modes="opengl_dl", layers="albedo"
+    )
     assert frame.modes == ("opengl_dl",)
     assert "albedo" in frame.layers
     assert frame.sample(pf.SampleRequest("depth", "opengl_dl")).depth is not None
 
 
-def test_a_frame_pickles(given: SimpleNamespace) -> None:
-    copy = pickle.loads(pickle.dumps(given.frame))
-    assert (copy.depth == given.frame.depth).all()
-    assert len(pickle.loads(pickle.dumps(given.views))) == 1
+def test_a_frame_pickles(valid_arguments: SimpleNamespace) -> None:
+    copy = pickle.loads(pickle.dumps(valid_arguments.frame))
+    assert (copy.depth == valid_arguments.frame.depth).all()
+    assert len(pickle.loads(pickle.dumps(valid_arguments.views))) == 1
 
 
-def test_a_mask_is_of_an_item_a_name_or_a_class(given: SimpleNamespace) -> None:
-    frame = given.frame
+def test_a_mask_is_of_an_item_a_name_or_a_class(valid_arguments: SimpleNamespace) -> None:
+    frame = valid_arguments.frame
     (row,) = (row for row in frame.instances if row["item"] == "can 1")
     can_1 = frame.mask("can 1")
     assert can_1.sum() == row["pixels"] > 0
@@ -409,16 +415,20 @@ def test_a_mask_is_of_an_item_a_name_or_a_class(given: SimpleNamespace) -> None:
     assert (frame.mask("wall") == np.isin(frame.instance, walls)).all()
 
 
-def test_frames_write_themselves_in_other_forms(given: SimpleNamespace, tmp_path: Path) -> None:
-    assert (given.views.export(tmp_path / "coco", to="coco") / "annotations.json").is_file()
-    given.frame.save(tmp_path / "root")
+def test_frames_write_themselves_in_other_forms(
+    valid_arguments: SimpleNamespace, tmp_path: Path
+) -> None:
+    assert (
+        valid_arguments.views.export(tmp_path / "coco", to="coco") / "annotations.json"
+    ).is_file()
+    valid_arguments.frame.save(tmp_path / "root")
     saved = pf.open(tmp_path / "root")
     assert any(saved[:1].export(tmp_path / "yolo", to="yolo").iterdir())
 
 
-def test_a_light_takes_its_colour_as_rgb(given: SimpleNamespace) -> None:
-    home = given.home.light("floor lamp", 500, colour="#ff8000")
+def test_a_light_takes_its_colour_as_rgb(valid_arguments: SimpleNamespace) -> None:
+    home = valid_arguments.home.light("floor lamp", 500, colour="#ff8000")
     (light, *_) = home.items["floor lamp"].lights
     assert light.rgb_linear == pytest.approx((1, 0.2158605, 0), abs=1e-6)
-    added = given.home.add_light((2, 2, 2), 400, colour=(0.25, 0.25, 0.25))
+    added = valid_arguments.home.add_light((2, 2, 2), 400, colour=(0.25, 0.25, 0.25))
     assert added.items["light 1"].lights[0].rgb_linear == pytest.approx((1, 1, 1))

@@ -1,4 +1,4 @@
-"""scripts/gpu_check.sh in two calls: each half by itself, its figures where $OUT says, little printed."""
+"""scripts/gpu_check.sh in two calls: each half separately, figures in $OUT, little output."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ esac
 
 @pytest.fixture
 def checkout(tmp_path: Path) -> Path:
-    """A checkout whose environment says it has a driver, and a Python that notes what it would run."""
+    """A checkout whose environment pretends to have a driver, and a Python that records its commands."""
     for name, text in {
         "env/bin/python": PYTHON,
         "env/bin/pip": "#!/bin/sh\n",
@@ -57,7 +57,7 @@ def checked(checkout: Path, *words: str) -> subprocess.CompletedProcess[str]:
         ([], {"gpu_tests.txt", "gpu.json"}, 1),
     ],
 )
-def test_each_half_leaves_its_figures_where_asked_and_prints_a_screen_at_most(
+def test_each_half_writes_its_figures_to_out_and_prints_a_screen_at_most(
     checkout: Path, words: list[str], files: set[str], status: int
 ) -> None:
     done = checked(checkout, *words)
@@ -84,7 +84,7 @@ def test_an_unknown_half_is_refused(checkout: Path) -> None:
     assert (done.returncode, done.stderr) == (2, "gpu_check: --only wants tests or views\n")
 
 
-def test_a_machine_without_a_gpu_is_told_in_one_line(checkout: Path) -> None:
+def test_without_a_gpu_the_check_ends_in_one_line(checkout: Path) -> None:
     (checkout / "bin/nvidia-smi").write_text("#!/bin/sh\necho no devices >&2\nexit 9\n")
     done = checked(checkout)
     assert done.returncode == 1

@@ -1,4 +1,4 @@
-"""What the GPU check carries to a machine without a network, and what it says when it cannot run there."""
+"""Libraries that the GPU check carries to a machine without a network, and its errors there."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def wheels(monkeypatch: pytest.MonkeyPatch) -> ModuleType:
         ("pyoidn/oidn/lib/CUT.txt", True),
         ("numpy/_core/tests/test_umath.py", False),
         ("trimesh/base.py", True),
-        # Posters of made homes are lettered: FreeType, and what it loads.
+        # Posters of generated homes have text: FreeType, and its dependencies.
         ("PIL/_imagingft.cpython-312-x86_64-linux-gnu.so", True),
         ("pillow.libs/libfreetype-57f805ba.so.6.20.6", True),
         ("pillow.libs/libharfbuzz-fb49c9fc.so.0.61450.0", True),
@@ -50,7 +50,7 @@ def test_only_files_that_the_check_cannot_use_stay_behind(
     assert wheels.is_carried(path) == carried
 
 
-def test_what_is_packed_comes_out_as_it_was_and_packs_to_the_same_bytes(
+def test_packed_files_are_restored_and_pack_to_the_same_bytes(
     wheels: ModuleType, tmp_path: Path
 ) -> None:
     site = tmp_path / "site"
@@ -76,21 +76,21 @@ def test_what_is_packed_comes_out_as_it_was_and_packs_to_the_same_bytes(
         }
 
 
-def test_every_requirement_is_asked_for_but_those_nothing_imports(wheels: ModuleType) -> None:
-    asked = wheels.requirements()
-    assert any(r.startswith("mitsuba") for r in asked)
-    assert any(r.startswith("celery") for r in asked)
-    assert not any(r.startswith("pyarrow") for r in asked)
+def test_every_requirement_is_fetched_except_unimported_ones(wheels: ModuleType) -> None:
+    names = wheels.requirements()
+    assert any(r.startswith("mitsuba") for r in names)
+    assert any(r.startswith("celery") for r in names)
+    assert not any(r.startswith("pyarrow") for r in names)
 
 
-def test_a_folder_for_another_python_is_told_in_one_line(tmp_path: Path) -> None:
+def test_a_folder_for_another_python_is_refused_in_one_line(tmp_path: Path) -> None:
     (tmp_path / "wheels-2.7.tar.xz").touch()
     done = subprocess.run(
         ["bash", str(SCRIPTS / "gpu_check.sh"), str(tmp_path)],
         env=os.environ | {"PYTHON": sys.executable}, capture_output=True, text=True,
     )  # fmt: skip
     (line,) = done.stderr.splitlines()
-    here = "{}.{}".format(*sys.version_info[:2])
+    this_python = "{}.{}".format(*sys.version_info[:2])
     assert done.returncode == 1
     assert "holds wheels-2.7.tar.xz" in line
-    assert f"here is Python {here}" in line
+    assert f"here is Python {this_python}" in line

@@ -1,4 +1,4 @@
-"""What scripts/gpu_wheels.py blanks in the libraries that it packs, and what it leaves alone."""
+"""Parts of libraries that scripts/gpu_wheels.py blanks, and parts that it keeps."""
 
 from __future__ import annotations
 
@@ -52,14 +52,14 @@ def elf(sections: list[tuple[int, int, bytes]], *, n_mapped: int, link: int = 0)
 
 
 def with_networks(first: bytes, second: bytes) -> bytes:
-    """A library of two networks, kept and other, with their symbols."""
+    """A library of two networks, one kept and one other, with their symbols."""
     strings = b"\0_ZN4oidn5blobs7weights4keptE\0_ZN4oidn5blobs7weights5otherE\0"
-    at = 0x1000
+    next_address = 0x1000
     symbols = b"".join(
         struct.pack("<IBBHQQ", strings.index(name), 0x11, 0, 1, address, size)
         for name, address, size in (
-            (b"_ZN4oidn5blobs7weights4kept", at, len(first)),
-            (b"_ZN4oidn5blobs7weights5other", at + len(first), len(second)),
+            (b"_ZN4oidn5blobs7weights4kept", next_address, len(first)),
+            (b"_ZN4oidn5blobs7weights5other", next_address + len(first), len(second)),
         )
     )
     return elf(
@@ -74,7 +74,7 @@ def with_networks(first: bytes, second: bytes) -> bytes:
     )
 
 
-def test_only_what_the_loader_does_not_map_is_blanked(cuts: ModuleType) -> None:
+def test_only_unmapped_parts_are_blanked(cuts: ModuleType) -> None:
     library = elf(
         [
             (PROGBITS, ALLOC, b"code"),
@@ -102,7 +102,7 @@ def test_all_networks_but_one_are_blanked(cuts: ModuleType) -> None:
         (with_networks(b"\xd7\x41one", b"other data"), "its symbol says other is"),
     ],
 )
-def test_a_library_whose_networks_are_not_found_is_packed_whole(
+def test_a_library_without_found_networks_is_packed_whole(
     wheels: ModuleType,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -117,8 +117,8 @@ def test_a_library_whose_networks_are_not_found_is_packed_whole(
     wheels.cut_networks(tmp_path)
     assert core.read_bytes() == library
     assert not (tmp_path / "CUT.txt").exists()
-    assert f"{core.name} is packed with all its networks: " in (said := capsys.readouterr().err)
-    assert reason in said
+    assert f"{core.name} is packed with all its networks: " in (output := capsys.readouterr().err)
+    assert reason in output
 
 
 def test_a_library_that_denoises_otherwise_when_cut_is_packed_whole(
@@ -133,7 +133,7 @@ def test_a_library_that_denoises_otherwise_when_cut_is_packed_whole(
 
 
 @pytest.mark.parametrize(("shown", "is_packed"), [("", True), ("as before", False)])
-def test_nothing_is_packed_once_the_denoiser_makes_no_picture_any_more(
+def test_nothing_is_packed_if_the_denoiser_no_longer_makes_a_picture(
     wheels: ModuleType,
     tmp_path: Path,
     monkeypatch: pytest.MonkeyPatch,
@@ -141,8 +141,8 @@ def test_nothing_is_packed_once_the_denoiser_makes_no_picture_any_more(
     shown: str,
     is_packed: bool,
 ) -> None:
-    # Where there was no picture to begin with, all networks are packed and nothing is to be compared.
-    # Here there is none: the folder holds no library.
+    # Without a first picture all networks are packed and nothing is compared. The folder holds no
+    # library here.
     def fetch(site: Path, _python: str) -> None:
         (site / "a.py").write_text("1\n")
 
@@ -155,12 +155,12 @@ def test_nothing_is_packed_once_the_denoiser_makes_no_picture_any_more(
         with pytest.raises(SystemExit, match="1"):
             wheels.main()
         (line,) = capsys.readouterr().err.splitlines()
-        said = "without debug data the denoiser makes another picture or none: OSError: "
-        assert line.startswith(f"gpu_wheels: {said}")
+        message = "without debug data the denoiser makes another picture or none: OSError: "
+        assert line.startswith(f"gpu_wheels: {message}")
     assert (tmp_path / "wheels-3.12.tar.xz").exists() == is_packed
 
 
-def test_a_denoiser_that_does_not_load_is_told_in_one_line(
+def test_a_denoiser_that_does_not_load_is_reported_in_one_line(
     wheels: ModuleType, tmp_path: Path
 ) -> None:
     with pytest.raises(ValueError, match=r"^OSError: .*libOpenImageDenoise\.so") as fault:
@@ -170,7 +170,7 @@ def test_a_denoiser_that_does_not_load_is_told_in_one_line(
 
 
 @pytest.mark.long
-def test_the_cut_denoiser_makes_the_same_bits_and_refuses_what_was_cut(
+def test_the_reduced_denoiser_makes_the_same_bits_and_refuses_blanked_networks(
     wheels: ModuleType, tmp_path: Path
 ) -> None:
     pyoidn = pytest.importorskip("pyoidn")

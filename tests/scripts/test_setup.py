@@ -1,4 +1,4 @@
-"""scripts/setup.sh says, on each system, what to install under the names it has there."""
+"""scripts/setup.sh names the packages to install for each system."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ SCRIPT = Path(__file__).parents[2] / "scripts" / "setup.sh"
 NEEDED = "libllvm19 libegl1 libgl1 libegl-mesa0 libgl1-mesa-dri redis-server"
 
 
-def told(release: str, tmp_path: Path, words: str, macos: bool = False) -> str:
-    """What a function of the script prints on a system of that /etc/os-release."""
+def output_of(release: str, tmp_path: Path, words: str, macos: bool = False) -> str:
+    """Output of a function of the script on a system with that /etc/os-release."""
     file = tmp_path / "os-release"
     file.write_text(release)
     prologue = "uname() { echo Darwin; }; " if macos else ""
@@ -38,18 +38,18 @@ def told(release: str, tmp_path: Path, words: str, macos: bool = False) -> str:
 def test_missing_packages_are_named_as_the_system_names_them(
     release: str, command: str, tmp_path: Path
 ) -> None:
-    assert command in told(release, tmp_path, f"command_for {NEEDED}")
+    assert command in output_of(release, tmp_path, f"command_for {NEEDED}")
 
 
-def test_a_mac_is_told_what_brew_installs(tmp_path: Path) -> None:
-    text = told("", tmp_path, f"command_for {NEEDED}", macos=True)
+def test_on_a_mac_the_brew_packages_are_named(tmp_path: Path) -> None:
+    text = output_of("", tmp_path, f"command_for {NEEDED}", macos=True)
     assert text == "brew install llvm redis"
-    assert "libegl1" not in told("", tmp_path, "missing_packages", macos=True)
+    assert "libegl1" not in output_of("", tmp_path, "missing_packages", macos=True)
 
 
-def test_llvm_comes_by_pip_where_the_system_has_none(tmp_path: Path) -> None:
+def test_llvm_comes_by_pip_if_the_system_has_none(tmp_path: Path) -> None:
     def has(answer: str) -> str:
-        return told("ID=debian", tmp_path, f"has_lib() {{ {answer}; }}; extras")
+        return output_of("ID=debian", tmp_path, f"has_lib() {{ {answer}; }}; extras")
 
     assert has("true").startswith("s3,")
     assert has("false") == f"llvm,{has('true')}"

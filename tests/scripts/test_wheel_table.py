@@ -1,4 +1,4 @@
-"""The table of wheels: what pyproject.toml asks for, and what docs/install.md shows of it."""
+"""The table of wheels: requirements of pyproject.toml, and their rows in docs/install.md."""
 
 from __future__ import annotations
 
@@ -31,9 +31,9 @@ def test_requirements_are_without_markers_and_extras(wheels: ModuleType) -> None
     assert groups == {"": ["a>=1"], "x": ["b>=2,<3"]}
 
 
-def test_a_cell_names_what_has_no_wheel(wheels: ModuleType) -> None:
-    made = wheels.table({"": ["a>=1", "b"], "x": ["c"]}, {"one": set(), "two": {"a", "c"}})
-    assert made.splitlines()[2:] == ["| none | all | no a |", "| `x` | all | no c |"]
+def test_a_cell_names_packages_without_a_wheel(wheels: ModuleType) -> None:
+    text = wheels.table({"": ["a>=1", "b"], "x": ["c"]}, {"one": set(), "two": {"a", "c"}})
+    assert text.splitlines()[2:] == ["| none | all | no a |", "| `x` | all | no c |"]
 
 
 def test_the_page_has_a_row_for_each_extra_and_a_column_for_each_system(wheels: ModuleType) -> None:

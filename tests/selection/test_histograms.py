@@ -1,4 +1,4 @@
-"""Histograms count every pixel once, in the bin the definition says, and nest exactly."""
+"""Histograms count every pixel once, in the defined bin, and nest exactly."""
 
 from __future__ import annotations
 
@@ -94,7 +94,7 @@ def test_bins_that_do_not_divide_are_rejected() -> None:
         coarser_depth(np.zeros(64, np.uint32), 128)
 
 
-def test_normalised_sums_to_one_and_nothing_stays_nothing() -> None:
+def test_normalised_sums_to_one_and_empty_stays_empty() -> None:
     shares = normalised(np.array([[1, 3, 0], [0, 0, 0]], np.uint32))
     assert shares.tolist() == [[0.25, 0.75, 0.0], [0.0, 0.0, 0.0]]
 
@@ -126,22 +126,22 @@ def record(modes: tuple[Mode, ...] = (Mode.MLT_IL_OL,)) -> ViewRecord:
 
 
 def test_a_record_survives_its_file_and_is_about_a_kilobyte_for_a_plain_picture() -> None:
-    one = record()
-    assert record_from_json(one.json_bytes(), "x") == one
-    assert one.json_bytes() == record().json_bytes()
+    first = record()
+    assert record_from_json(first.json_bytes(), "x") == first
+    assert first.json_bytes() == record().json_bytes()
     flat = np.zeros((48, 64, 3), np.uint8)
     flat[:, 32:] = 200
     small = selection.view_record(
         {"house": "h", "view": "v", "room": "r", "room_type": "t"},
         {Mode.MLT_OL: flat},
         np.full((48, 64), 900, np.uint16),
-        one.scene,
+        first.scene,
         FIELDS,
     )
     assert len(small.json_bytes()) < 1200
 
 
-def test_the_scored_mode_is_kept_alone_and_the_others_only_without_it() -> None:
+def test_only_the_scored_mode_is_kept_and_others_replace_a_missing_one() -> None:
     assert set(record(tuple(Mode)).colour) == {Mode.MLT_IL_OL}
     rest = (Mode.OPENGL_DL, Mode.MLT_OL)
     assert set(record(rest).colour) == set(rest)

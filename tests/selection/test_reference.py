@@ -1,4 +1,4 @@
-"""A reference file is a function of its photographs, picks its binning by them, and names faults."""
+"""A reference file is a function of its photographs, chooses its binning by them, and names faults."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_a_reference_survives_its_file_and_equal_ones_give_equal_bytes() -> None
     assert ref.digest != reference(seed=5).digest
 
 
-def test_the_file_opens_with_numpy_alone() -> None:
+def test_the_file_opens_with_only_numpy() -> None:
     ref = reference()
     with np.load(io.BytesIO(bytes_from_reference(ref))) as file:
         assert np.array_equal(file["depth"], ref.depth)
@@ -53,13 +53,13 @@ def test_the_file_opens_with_numpy_alone() -> None:
 
 def test_a_damaged_file_or_another_version_is_named() -> None:
     data = bytes_from_reference(reference())
-    other = data.replace(b"reference.json", b"deference.json")
-    for wrong in (b"", b"PK\x03\x04", data[: len(data) // 2], other):
+    damaged = data.replace(b"reference.json", b"deference.json")
+    for wrong in (b"", b"PK\x03\x04", data[: len(data) // 2], damaged):
         with pytest.raises(BadInput, match=r"nyu\.npz"):
             reference_from_bytes(wrong, "nyu.npz")
 
 
-def test_left_one_out_table_is_what_a_double_loop_gives() -> None:
+def test_left_one_out_table_equals_a_double_loop() -> None:
     rng = np.random.default_rng(3)
     sets = [random_histogram(rng, FINE) for _ in range(6)]
     colour = np.stack([h.colour for h in sets])
@@ -113,7 +113,7 @@ def test_the_finest_binning_that_95_percent_pass_is_chosen_for_each() -> None:
     assert "* 8x8x4     256  95.0 %" in table_text(rows, chosen)
 
 
-def test_where_none_passes_the_coarsest_is_taken() -> None:
+def test_if_none_passes_the_coarsest_is_used() -> None:
     rows = [row(b, 0.5, 1.0) for b in BINNINGS]
     chosen = finest_passing(rows)
     assert (chosen.colour, chosen.depth) == ((2, 2, 2), 128)
@@ -139,12 +139,12 @@ def test_other_settings_are_an_error_that_names_file_and_fields() -> None:
     ref = reference(fields=FINE)
     check_comparable(ref, FINE, "nyu.npz")
     check_comparable(ref, HistogramFields(colour_bins=16, depth_bins=256), "nyu.npz")
-    for other, field in (
+    for foreign, field in (
         (HistogramFields(colour_space="ycbcr"), "colour_space"),
         (HistogramFields(depth_max_m=8.0), "depth_max_m"),
     ):
         with pytest.raises(BadInput, match=rf"nyu\.npz.*{field}"):
-            check_comparable(ref, other, "nyu.npz")
+            check_comparable(ref, foreign, "nyu.npz")
 
 
 def test_bins_coarser_than_the_reference_compares_are_rejected() -> None:

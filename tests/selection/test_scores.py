@@ -1,4 +1,4 @@
-"""Scores are the paper's, whichever library finds them; tables merge in any order."""
+"""Scores follow the paper, with either library; tables merge in any order."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def plain_scores(counts: np.ndarray, references: np.ndarray) -> np.ndarray:
     for view in counts.astype(float):
         view = view / view.sum() if view.sum() else view
         top = 0.0
-        for other in references.astype(float):
-            other = other / other.sum()
-            top = max(top, sum(min(a, b) for a, b in zip(view, other)))
+        for row in references.astype(float):
+            row = row / row.sum()
+            top = max(top, sum(min(a, b) for a, b in zip(view, row)))
         best.append(top)
     return np.array(best)
 
@@ -130,22 +130,22 @@ def test_two_different_scores_of_one_view_are_rejected() -> None:
         merge_tables(a, b)
 
 
-def test_a_view_without_the_mode_is_scored_on_another_only_when_told() -> None:
+def test_a_view_without_the_mode_is_scored_on_another_only_on_request() -> None:
     rng = np.random.default_rng(0)
     rows = [record("a", "0_0_0", rng, modes=(Mode.OPENGL_DL,)), record("a", "0_0_1", rng)]
     silent = score([pack_house("a", "s", FIELDS, rows)], reference())
     assert silent["fault"].to_pylist() == ["unscored", ""]
     assert silent["colour_score"].to_pylist()[0] is None
-    told = score([pack_house("a", "s", FIELDS, rows, score_mode=Mode.OPENGL_DL)], reference())
-    assert told["mode"].to_pylist() == ["opengl_dl", "mlt_il_ol"]
-    assert told["colour_score"].null_count == 0
+    scored = score([pack_house("a", "s", FIELDS, rows, score_mode=Mode.OPENGL_DL)], reference())
+    assert scored["mode"].to_pylist() == ["opengl_dl", "mlt_il_ol"]
+    assert scored["colour_score"].null_count == 0
 
 
-def test_modes_in_whose_picture_nothing_is_seen_are_named() -> None:
+def test_modes_with_dark_or_blown_pictures_are_named() -> None:
     row = record("a", "0_0_0", np.random.default_rng(0))
     dark = {Mode.MLT_OL: 1 / 255, Mode.OPENGL_IL: 0.0, Mode.OPENGL_DL: 2 / 255}
-    others = {m: PictureQuality(brightness=round(b, 5), blown=0.0) for m, b in dark.items()}
-    row = row.model_copy(update={"picture": row.picture | others})
+    bright = {m: PictureQuality(brightness=round(b, 5), blown=0.0) for m, b in dark.items()}
+    row = row.model_copy(update={"picture": row.picture | bright})
     assert score([pack_house("a", "s", FIELDS, [row])], reference())["black"].to_pylist() == [
         "mlt_ol opengl_il"
     ]

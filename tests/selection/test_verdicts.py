@@ -1,4 +1,4 @@
-"""A view is kept for the paper's reason or rejected for one that is named with its number."""
+"""A view is kept for the paper's reason, or rejected for a named reason with its number."""
 
 from __future__ import annotations
 
@@ -62,11 +62,11 @@ def test_each_number_beyond_its_threshold_rejects_with_its_reason(
     assert reason in REASONS
 
 
-def test_a_black_picture_is_refused_whatever_the_thresholds() -> None:
+def test_a_black_picture_is_refused_for_any_thresholds() -> None:
     assert reasons({"brightness": 0.0}, {"brightness": 0.01}, min_brightness=0.0) == ["black", ""]
 
 
-def test_a_picture_that_is_black_in_another_mode_is_refused_where_the_recipe_asks() -> None:
+def test_a_picture_black_in_another_mode_is_refused_if_the_recipe_asks() -> None:
     rows = {"black": "mlt_ol"}, {"black": "opengl_dl"}, {"black": "opengl_dl mlt_ol"}, {"black": ""}
     assert reasons(*rows) == ["", "", "", ""]
     assert reasons(*rows, black_modes="light") == ["black", "", "black", ""]
@@ -106,22 +106,22 @@ def test_equal_views_are_capped_by_their_id() -> None:
     assert reasons(*rows, per_room_cap=1) == ["room-cap", "", "room-cap"]
 
 
-def test_a_lower_threshold_keeps_at_least_what_a_higher_one_keeps() -> None:
+def test_a_lower_threshold_keeps_all_views_of_a_higher_one() -> None:
     scores = score([pack(name, 9) for name in "abc"], reference())
-    kept = [
+    kept_ids = [
         verdicts(scores, SelectionFields(min_colour=t, min_depth=t))["kept"].to_numpy()
         for t in np.linspace(0, 1, 21)
     ]
-    assert all((low | ~high).all() for low, high in itertools.pairwise(kept))
-    assert kept[0].all()
-    assert not kept[-1].any()
+    assert all((low | ~high).all() for low, high in itertools.pairwise(kept_ids))
+    assert kept_ids[0].all()
+    assert not kept_ids[-1].any()
 
 
 def test_verdicts_of_merged_houses_are_the_merged_verdicts() -> None:
     fields = SelectionFields(per_room_cap=1, min_colour=0.3, min_depth=0.3)
     a, b = (score([pack(name, 7)], reference()) for name in "ab")
-    apart = [verdicts(t, fields) for t in (a, b)]
-    assert verdicts(merge_tables(b, a), fields).equals(pa.concat_tables(apart).combine_chunks())
+    separate = [verdicts(t, fields) for t in (a, b)]
+    assert verdicts(merge_tables(b, a), fields).equals(pa.concat_tables(separate).combine_chunks())
 
 
 def test_no_views_no_verdicts() -> None:
@@ -129,7 +129,7 @@ def test_no_views_no_verdicts() -> None:
 
 
 def slow_balance(shares: np.ndarray, n_views: int) -> np.ndarray:
-    """Plain greedy: the view that gains most, again and again."""
+    """Plain greedy: repeatedly the view that gains most."""
     taken, total = np.zeros(len(shares), bool), np.full(shares.shape[1], 0.01)
     for _ in range(n_views):
         gains = np.log1p(shares / total).sum(axis=1)
@@ -139,7 +139,7 @@ def slow_balance(shares: np.ndarray, n_views: int) -> np.ndarray:
     return taken
 
 
-def test_lazy_balance_takes_what_plain_greedy_takes() -> None:
+def test_lazy_balance_equals_plain_greedy() -> None:
     rng = np.random.default_rng(0)
     shares = rng.dirichlet(np.full(41, 0.1), 60).astype(np.float32)
     for n_views in (0, 1, 7, 30, 60):
@@ -156,18 +156,18 @@ def test_balance_keeps_the_rare_classes() -> None:
     ]
     fields = SelectionFields(balance="classes", balance_share=0.25)
     judged = verdicts(table(*rows), fields).to_pylist()
-    kept = [r["classes"] for r in judged if r["kept"]]
-    assert len(kept) == 3
-    assert set(rare) <= set(kept)
+    kept_classes = [r["classes"] for r in judged if r["kept"]]
+    assert len(kept_classes) == 3
+    assert set(rare) <= set(kept_classes)
     assert {r["reason"] for r in judged if not r["kept"]} == {"class-balance"}
 
 
 def test_balance_does_not_depend_on_the_order_of_rows() -> None:
     rows = [{"view": f"0_0_{k}", "classes": f"1:0.5 {3 + k % 3}:0.1"} for k in range(9)]
     fields = SelectionFields(balance="classes")
-    there = verdicts(table(*rows), fields).to_pylist()
+    forward = verdicts(table(*rows), fields).to_pylist()
     back = verdicts(table(*reversed(rows)), fields).to_pylist()
-    assert [r["kept"] for r in there] == [r["kept"] for r in reversed(back)]
+    assert [r["kept"] for r in forward] == [r["kept"] for r in reversed(back)]
 
 
 def test_class_shares_are_read_back() -> None:

@@ -1,4 +1,4 @@
-"""A set of two small homes, written as files, and what a set's folder holds."""
+"""A set of two small homes, written as files, and the contents of a set's folder."""
 
 from __future__ import annotations
 
@@ -57,7 +57,7 @@ def small_set(folder: Path) -> Path:
 
 
 def digests(out: Path) -> dict[str, str]:
-    """Every file of a set's folder but markers, which have clocks, by its SHA-256."""
+    """SHA-256 of every file of a set's folder except markers, which have clocks."""
     return {
         path.relative_to(out).as_posix(): hashlib.sha256(path.read_bytes()).hexdigest()
         for path in sorted(out.rglob("*"))
@@ -66,6 +66,6 @@ def digests(out: Path) -> dict[str, str]:
 
 
 def sums(out: Path) -> dict[str, str]:
-    """The lines of SHA256SUMS, as coreutils read them."""
+    """The lines of SHA256SUMS in coreutils' format."""
     rows = [line.split("  ", 1) for line in (out / "SHA256SUMS").read_text().splitlines()]
     return {name: digest for digest, name in rows}

@@ -1,4 +1,4 @@
-"""What a set costs is samples, homes and pixels times what one costs, and that times a price."""
+"""A set's cost is its samples, homes and pixels times their unit costs, times a price."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def of(modes: str = "mlt_il_ol", more: str = "") -> str:
     return SET.replace("{modes}", modes) + more
 
 
-def test_light_is_samples_times_what_one_costs() -> None:
+def test_light_is_samples_times_the_cost_of_one() -> None:
     lit = estimate_set(set_from_bytes(of().encode(), "a.toml"))
     plain = estimate_set(set_from_bytes(of("opengl_dl").encode(), "a.toml"))
     m = measured()
@@ -55,7 +55,7 @@ def test_a_walk_has_its_frames_and_a_pair_two_pictures() -> None:
     assert megasamples(pairs) == pytest.approx(2 * pairs.light.spp * 640 * 480 / 1e6)
 
 
-def test_forms_add_bytes_alone() -> None:
+def test_forms_add_only_bytes() -> None:
     plain = estimate_set(set_from_bytes(of().encode(), "a.toml"))
     more = estimate_set(set_from_bytes(of(more="[form.coco]\n[form.hdf5]\n").encode(), "a.toml"))
     pixels = 2 * 3_000 * 500_000
@@ -67,11 +67,11 @@ def test_forms_add_bytes_alone() -> None:
 
 def test_every_price_has_a_source_and_a_date() -> None:
     assert len(prices()) >= 3
-    for cloud, own in prices().items():
-        for price in own.values():
+    for cloud, rates in prices().items():
+        for price in rates.values():
             assert price.source.startswith("https://"), (cloud, price.what)
             assert date(2026, 1, 1) <= price.date
-        assert own["cpu_hour_spot"].usd < own["cpu_hour"].usd
+        assert rates["cpu_hour_spot"].usd < rates["cpu_hour"].usd
 
 
 @pytest.mark.parametrize("name", shipped_sets())
@@ -89,8 +89,8 @@ def test_every_shipped_set_has_an_estimate(name: str, capsys: pytest.CaptureFixt
     assert main(["estimate", name, "--json"]) == 0
     assert json.loads(capsys.readouterr().out)["views"] == estimate.views
     assert main(["estimate", name]) == 0
-    told = capsys.readouterr().out
-    assert all(word in told for word in ("CPU hours", *prices(), f"{estimate.views:,}"))
+    output = capsys.readouterr().out
+    assert all(word in output for word in ("CPU hours", *prices(), f"{estimate.views:,}"))
 
 
 def test_a_bill_is_amounts_times_prices(capsys: pytest.CaptureFixture[str]) -> None:
@@ -110,7 +110,7 @@ def test_a_bill_is_amounts_times_prices(capsys: pytest.CaptureFixture[str]) -> N
     assert list(json.loads(capsys.readouterr().out)) == ["AWS"]
 
 
-def test_a_bill_says_a_dash_where_no_price_is_known(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_bill_has_a_dash_for_an_unknown_price(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["estimate", "indoor-1k", "--cloud", "AWS"]) == 0
     (line,) = [
         x for x in capsys.readouterr().out.splitlines() if x.startswith("GPU hours of light, spot")
@@ -118,7 +118,7 @@ def test_a_bill_says_a_dash_where_no_price_is_known(capsys: pytest.CaptureFixtur
     assert line.split()[-2:] == ["-", "-"]
 
 
-def test_a_bill_says_what_costs_nothing_in_numbers() -> None:
+def test_a_bill_has_zero_for_a_free_part() -> None:
     free = BillLine(what="a", amount=2.0, usd_each=0.0, usd=0.0, of="x", read_on="2026-01-01")
     unknown = BillLine(what="b", amount=2.0, usd_each=None, usd=None, of="", read_on="")
     _head, *lines = bill_text([free, unknown]).splitlines()
@@ -126,6 +126,6 @@ def test_a_bill_says_what_costs_nothing_in_numbers() -> None:
     assert lines[1].split() == ["b", "2.00", "-", "-"]
 
 
-def test_a_cloud_without_prices_is_told(capsys: pytest.CaptureFixture[str]) -> None:
+def test_a_cloud_without_prices_is_refused(capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["estimate", "indoor-1k", "--cloud", "Azure"]) == 1
     assert "Azure: no prices of this cloud (of AWS" in capsys.readouterr().err

@@ -1,4 +1,4 @@
-"""A set's file is read whole before anything is made: those that are shipped, and what is wrong with one."""
+"""A set's file is checked completely before any output: the shipped ones, and faulty ones."""
 
 from __future__ import annotations
 
@@ -39,14 +39,14 @@ parts = ["views"]
 """
 
 
-def test_a_part_has_the_options_of_all_parts_and_its_own() -> None:
+def test_a_part_has_the_options_of_all_parts_and_separate_ones() -> None:
     data_set = set_from_bytes(TEXT.encode(), "some/rooms.toml")
     assert (data_set.name, data_set.file) == ("rooms", "rooms.toml")
     assert data_set.shares == SplitShares(0.8, 0.1, 0.1)
     views, walks = data_set.parts
     assert views.homes == tuple(f"made:{k}" for k in range(1, 7))
     assert (views.dress_seeds, views.want.n_views, views.n_houses) == ((1, 2), 3, 12)
-    # Lists are joined, and what stands last wins.
+    # Lists are joined, and the last value wins.
     assert set(views.want.layers) == {"albedo", "depth_z"}
     assert (views.recipe.light.spp, walks.recipe.light.spp) == (9, 8)
     assert (walks.recipe.cameras.source, walks.recipe.cameras.walk_frames) == ("walk", 12)
@@ -95,16 +95,16 @@ def test_a_shard_that_is_none_is_refused(word: str) -> None:
         ("dress = ", "select = ['blck']\ndress = ", r"rooms.toml \[part.views\]: select: blck is not a choice.*black"),
     ],
 )  # fmt: skip
-def test_what_is_wrong_is_one_line_with_file_and_place(
+def test_faults_are_one_line_with_file_and_place(
     old: str, new: str, message: str, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert old in TEXT
     (tmp_path / "rooms.toml").write_text(TEXT.replace(old, new))
     assert main(["make", str(tmp_path / "rooms.toml"), "--out", str(tmp_path / "out")]) == 1
-    told = capsys.readouterr().err
+    error = capsys.readouterr().err
     with pytest.raises(BadInput, match=message):
-        raise BadInput(told.removeprefix("pbrs-farm: ").strip(), "", "")
-    assert told.count("\n") == 1
+        raise BadInput(error.removeprefix("pbrs-farm: ").strip(), "", "")
+    assert error.count("\n") == 1
     assert not (tmp_path / "out").exists()
 
 
@@ -140,11 +140,11 @@ def test_a_part_is_submitted_with_the_recipe_that_make_has(
         "--part: a store has one recipe, so one part (of views, walks)" in capsys.readouterr().err
     )
     assert main(["submit", str(file), "--part", "views", "--dry-run", "--json"]) == 0
-    told = json.loads(capsys.readouterr().out)
-    assert (told["houses"], told["views"]) == (12, 36)
+    jobs = json.loads(capsys.readouterr().out)
+    assert (jobs["houses"], jobs["views"]) == (12, 36)
 
 
-def test_a_shipped_set_is_found_beside_a_folder_of_its_name(
+def test_a_shipped_set_is_found_despite_a_folder_of_its_name(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     monkeypatch.chdir(tmp_path)
@@ -155,7 +155,7 @@ def test_a_shipped_set_is_found_beside_a_folder_of_its_name(
 VIEWS = {"indoor-1k": 1_000, "indoor-10k": 10_000, "indoor-60k": 60_000}
 
 
-def test_every_shipped_set_is_one_of_these() -> None:
+def test_every_shipped_set_is_tested_here() -> None:
     assert set(shipped_sets()) == set(VIEWS)
 
 

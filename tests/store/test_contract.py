@@ -1,4 +1,4 @@
-"""Every store keeps the same promises; S3 joins when PBRS_S3_ENDPOINT names a gateway."""
+"""Every store keeps the same promises; S3 is included if PBRS_S3_ENDPOINT names a gateway."""
 
 from __future__ import annotations
 
@@ -25,7 +25,7 @@ def store(request: pytest.FixtureRequest, tmp_path: Path) -> Iterator[Store]:
         yield FolderStore(tmp_path / "store", fsync=request.param == "fsync")
 
 
-def test_what_was_put_is_what_is_got(store: Store) -> None:
+def test_put_bytes_are_returned(store: Store) -> None:
     store.put("houses/h/house.json", b"{}")
     assert store.get("houses/h/house.json") == b"{}"
     head = store.head("houses/h/house.json")
@@ -33,7 +33,7 @@ def test_what_was_put_is_what_is_got(store: Store) -> None:
     assert head.n_bytes == 2
 
 
-def test_a_part_of_an_object_is_got_by_itself(store: Store) -> None:
+def test_a_part_of_an_object_can_be_read(store: Store) -> None:
     store.put("a", b"0123456789")
     assert store.get_range("a", 3, 4) == b"3456"
     assert store.get_range("a", 8, 2) == b"89"
@@ -80,7 +80,7 @@ def test_of_racing_creators_exactly_one_wins(store: Store) -> None:
     assert store.get("race") == str(wins[0]).encode() * 1000
 
 
-def test_a_missing_object_is_told_apart(store: Store) -> None:
+def test_a_missing_object_is_a_distinct_error(store: Store) -> None:
     assert store.head("no/such") is None
     with pytest.raises(ObjectMissing, match="no/such"):
         store.get("no/such")

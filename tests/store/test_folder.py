@@ -16,7 +16,7 @@ from pbrs_farm.core.errors import StoreFailed, StoreUnavailable
 from pbrs_farm.store.folder import TEMPORARY, FolderStore
 
 
-def test_a_full_disk_is_one_line_and_leaves_nothing(
+def test_a_full_disk_is_one_line_and_leaves_no_file(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     store = FolderStore(tmp_path)
@@ -33,10 +33,10 @@ def test_a_full_disk_is_one_line_and_leaves_nothing(
     assert list((tmp_path / TEMPORARY).iterdir()) == []
 
 
-def test_a_truly_full_device_is_told() -> None:
+def test_a_truly_full_device_is_reported() -> None:
     with pytest.raises(OSError, match="No space") as caught:
         Path("/dev/full").write_bytes(b"x")
-    failure = FolderStore(Path("/data"))._failure("k", caught.value)
+    failure = FolderStore(Path("/data")).failure("k", caught.value)
     assert isinstance(failure, StoreUnavailable)
 
 
@@ -50,7 +50,7 @@ def test_a_forbidden_folder_is_one_line_and_not_retried(tmp_path: Path) -> None:
 
 @contextmanager
 def as_nobody() -> Iterator[None]:
-    """Act as a user without rights, where the tests run as root, who may write anywhere."""
+    """Act as a user without rights if the tests run as root, who may write anywhere."""
     if os.geteuid() != 0:
         yield
         return
@@ -61,7 +61,7 @@ def as_nobody() -> Iterator[None]:
         os.seteuid(0)
 
 
-def test_a_read_only_folder_is_told() -> None:
+def test_a_read_only_folder_is_reported() -> None:
     with tempfile.TemporaryDirectory(dir="/tmp") as name:
         folder = Path(name)
         FolderStore(folder).put("before", b"1")
@@ -76,13 +76,13 @@ def test_a_read_only_folder_is_told() -> None:
 def test_unfinished_files_are_never_listed_and_swept_when_old(tmp_path: Path) -> None:
     store = FolderStore(tmp_path)
     store.put("a", b"1")
-    left = tmp_path / TEMPORARY / "123-abc"
-    left.write_bytes(b"half")
+    stale = tmp_path / TEMPORARY / "123-abc"
+    stale.write_bytes(b"half")
     assert list(store.list()) == ["a"]
     assert store.sweep() == 0
-    os.utime(left, (time.time() - 1e6,) * 2)
+    os.utime(stale, (time.time() - 1e6,) * 2)
     assert store.sweep() == 1
-    assert not left.exists()
+    assert not stale.exists()
 
 
 def test_files_take_the_umask_not_a_private_mode(tmp_path: Path) -> None:
@@ -94,7 +94,7 @@ def test_files_take_the_umask_not_a_private_mode(tmp_path: Path) -> None:
     assert (tmp_path / "a").stat().st_mode & 0o777 == 0o640
 
 
-def test_a_tidied_folder_holds_its_objects_alone(tmp_path: Path) -> None:
+def test_a_tidied_folder_holds_only_its_objects(tmp_path: Path) -> None:
     store = FolderStore(tmp_path)
     store.put("a/b.txt", b"1")
     store.tidy()

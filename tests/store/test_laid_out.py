@@ -1,4 +1,4 @@
-"""A packed root: the same keys and bytes as files give, in few requests, and nothing lost."""
+"""A packed root: the same keys and bytes as files, in few requests, and no loss."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ from workers.coordinator.recover import done_steps
 RECIPE = recipe_from_name("fast")
 HOUSE, VIEW = "studio-0123abcd", "room0_3"
 LABELS, LIGHT = ("truth", "opengl_dl", "opengl_il"), ("light", "develop", "view")
-# What the steps of a view write; radiance is larger than what is read of a pack at first.
+# Output of a view's steps; radiance is larger than the first read of a pack.
 FILES = {
     "truth": {"depth.png": b"d" * 700, "behind_glass/depth.png": b"", "normal.png": b"n" * 90_000},
     "opengl_dl": {"opengl_dl.png": b"o" * 3000},
@@ -41,7 +41,7 @@ FILES = {
 
 
 class CountingStore(MemoryStore):
-    """Counts requests, and stops answering writes after so many."""
+    """Counts requests, and stops answering writes after a limit."""
 
     def __init__(self, most_writes: float = float("inf")) -> None:
         super().__init__()
@@ -91,7 +91,7 @@ def packed(inner: Store | None = None) -> LaidOutStore:
 
 
 def do(store: Store, *steps: str, view: str = VIEW, recipe: object = RECIPE) -> None:
-    """Do steps as the farm does; each reads what its inputs have made, too."""
+    """Do steps like the farm; each also reads the outputs of its inputs."""
     work = Work(store, recipe, HOUSE, HouseCache(), view_id=view)  # type: ignore[arg-type]
     for name in steps:
         files = FILES.get(name, {f"{name}.json": b"{}"})
@@ -105,14 +105,14 @@ def house_done(store: Store) -> None:
 
 def view_done(store: Store, view: str = VIEW) -> None:
     for steps in (LABELS, LIGHT):
-        with one_task(store, reads_whole=True) as own:
-            do(own, *steps, view=view)
+        with one_task(store, reads_whole=True) as task_store:
+            do(task_store, *steps, view=view)
 
 
 @pytest.fixture(autouse=True)
 def _house_without_source(monkeypatch: pytest.MonkeyPatch) -> None:
-    # The steps of a view ask for their house's marker, not for its source.
-    monkeypatch.setattr("pbrs_farm.run.step_cache._extra", lambda _name, _work: None)
+    # The steps of a view need their house's marker but not its source.
+    monkeypatch.setattr("pbrs_farm.run.step_cache.extra_inputs", lambda _name, _work: None)
 
 
 def prepared(inner: Store | None = None) -> LaidOutStore:
@@ -128,17 +128,17 @@ def prepared(inner: Store | None = None) -> LaidOutStore:
 
 def all_of(store: Store) -> dict[str, bytes]:
     """Every object of the houses by key, markers without their clocks."""
-    found = {}
+    objects = {}
     for key in store.list("houses/"):
         marker = read_marker(store, key) if "/done/" in key else None
         calm = {"seconds": 0.0, "worker": "", "finished_utc": ""}
-        found[key] = (
+        objects[key] = (
             store.get(key) if marker is None else marker.model_copy(update=calm).json_bytes()
         )
-    return found
+    return objects
 
 
-def test_a_packed_root_holds_what_a_root_of_files_does() -> None:
+def test_a_packed_root_holds_the_objects_of_a_root_of_files() -> None:
     files = MemoryStore()
     claim_root(files, RECIPE, update=False)
     run_unless_done(
@@ -148,10 +148,10 @@ def test_a_packed_root_holds_what_a_root_of_files_does() -> None:
     )
     house_done(files)
     store = prepared()
-    for one in (files, store):
-        view_done(one)
-        view_done(one, "room0_4")
-        finish_house(one, HOUSE)
+    for layout in (files, store):
+        view_done(layout)
+        view_done(layout, "room0_4")
+        finish_house(layout, HOUSE)
     assert all_of(store) == all_of(files)
     folder = keys.view_key(HOUSE, VIEW)
     assert sorted(store.list(folder)) == sorted(files.list(folder))
@@ -193,15 +193,15 @@ def test_a_view_costs_three_writes_and_at_most_nine_reads() -> None:
     inner.calls.clear()
     inner.listed.clear()
     for steps in (LABELS, LIGHT):
-        with one_task(store, reads_whole=True) as own:
+        with one_task(store, reads_whole=True) as task_store:
             for view in views:
-                do(own, *steps, view=view)
+                do(task_store, *steps, view=view)
     assert inner.calls["put"] == 3 * len(views)
-    with one_task(store, reads_whole=False) as own:
-        finish_house(own, HOUSE)
+    with one_task(store, reads_whole=False) as task_store:
+        finish_house(task_store, HOUSE)
     assert inner.calls["put"] == 3 * len(views) + 1
     assert inner.calls["get"] <= 9 * len(views)
-    # What lies under views/ is never listed, nor anything of other houses.
+    # Neither views/ nor any other house is ever listed.
     assert inner.listed
     assert all(HOUSE in prefix and "/views/" not in prefix for prefix in inner.listed)
 
@@ -217,7 +217,7 @@ def test_killed_at_any_write_the_next_run_makes_the_rest_and_loses_nothing(n_wri
         view_done(store)
     before = all_of(store)
     inner.most_writes = float("inf")
-    # Whatever has a marker has its files.
+    # Every marker has its files.
     for key in before:
         if "/done/" in key and (marker := read_marker(store, key)) is not None:
             assert {file.key for file in marker.files} <= before.keys()
@@ -231,8 +231,8 @@ def test_a_step_that_fails_leaves_those_before_it_done() -> None:
     store = prepared()
 
     def task() -> None:
-        with one_task(store, reads_whole=True) as own:
-            do(own, "truth", "opengl_dl")
+        with one_task(store, reads_whole=True) as task_store:
+            do(task_store, "truth", "opengl_dl")
             raise ZeroDivisionError
 
     with pytest.raises(ZeroDivisionError):
@@ -240,18 +240,20 @@ def test_a_step_that_fails_leaves_those_before_it_done() -> None:
     assert read_marker(store, keys.marker_key(HOUSE, "opengl_dl", VIEW)) is not None
 
 
-def test_what_a_task_has_made_is_seen_by_it_at_once_and_by_others_whole() -> None:
+def test_outputs_are_visible_to_their_task_immediately_and_to_others_complete() -> None:
     store = prepared()
-    with one_task(store, reads_whole=True) as own:
-        do(own, "truth")
-        assert own.get(keys.view_key(HOUSE, VIEW, "depth.png")) == FILES["truth"]["depth.png"]
+    with one_task(store, reads_whole=True) as task_store:
+        do(task_store, "truth")
+        assert (
+            task_store.get(keys.view_key(HOUSE, VIEW, "depth.png")) == FILES["truth"]["depth.png"]
+        )
         assert store.head(keys.view_key(HOUSE, VIEW, "depth.png")) is None
-        # Light takes long: what came before it is written first.
-        read_marker(own, keys.marker_key(HOUSE, "light", VIEW))
+        # Light takes long: earlier outputs are written first.
+        read_marker(task_store, keys.marker_key(HOUSE, "light", VIEW))
         assert read_marker(LaidOutStore(store.inner), keys.marker_key(HOUSE, "truth", VIEW))
 
 
-def test_two_writers_of_one_group_both_keep_what_they_made() -> None:
+def test_two_writers_of_one_group_both_keep_their_outputs() -> None:
     store = prepared()
     with one_task(store, reads_whole=True) as a, one_task(store, reads_whole=True) as b:
         do(a, "truth", "opengl_dl")
@@ -263,7 +265,7 @@ def test_two_writers_of_one_group_both_keep_what_they_made() -> None:
     assert len([k for k in store.list("houses/") if k.endswith("opengl_dl.png")]) == 1
 
 
-def test_a_step_made_anew_leaves_the_others_of_its_pack() -> None:
+def test_a_repeated_step_keeps_the_others_of_its_pack() -> None:
     store = prepared()
     view_done(store)
     store.delete(keys.marker_key(HOUSE, "truth", VIEW))
@@ -273,10 +275,10 @@ def test_a_step_made_anew_leaves_the_others_of_its_pack() -> None:
         store.get(keys.view_key(HOUSE, VIEW, "opengl_il.png"))
         == FILES["opengl_il"]["opengl_il.png"]
     )
-    with one_task(store, reads_whole=True) as own:
-        do(own, "truth")
+    with one_task(store, reads_whole=True) as task_store:
+        do(task_store, "truth")
     assert store.get(keys.view_key(HOUSE, VIEW, "depth.png")) == FILES["truth"]["depth.png"]
-    # Once more, now from its own pack; the last step takes the pack with it.
+    # Once more, now from its own pack; the last step rewrites the pack.
     for step in LABELS:
         store.delete(keys.marker_key(HOUSE, step, VIEW))
     packs = [
@@ -288,31 +290,31 @@ def test_a_step_made_anew_leaves_the_others_of_its_pack() -> None:
 def test_stale_pictures_give_way_to_those_of_new_light() -> None:
     store = prepared()
     view_done(store)
-    # Another recipe: light is made anew, and with it what is developed from it.
+    # With another recipe light is made again, and so are its developed pictures.
     store.delete(keys.marker_key(HOUSE, "light", VIEW))
-    other = with_settings(RECIPE, {"light.spp": 3})
-    with one_task(store, reads_whole=True) as own:
-        do(own, *LIGHT, recipe=other)
+    more_samples = with_settings(RECIPE, {"light.spp": 3})
+    with one_task(store, reads_whole=True) as task_store:
+        do(task_store, *LIGHT, recipe=more_samples)
     files = MemoryStore()
     claim_root(files, RECIPE, update=False)
     for step in ("house", "cameras", "illuminance"):
         key = keys.marker_key(HOUSE, step)
         files.put(key, store.get(key))
-    with one_task(files, reads_whole=True) as own:
-        do(own, *LABELS)
-        do(own, *LIGHT, recipe=other)
+    with one_task(files, reads_whole=True) as task_store:
+        do(task_store, *LABELS)
+        do(task_store, *LIGHT, recipe=more_samples)
     for step in LIGHT:
         key = keys.marker_key(HOUSE, step, VIEW)
-        found, expected = read_marker(store, key), read_marker(files, key)
-        assert found is not None
+        marker, expected = read_marker(store, key), read_marker(files, key)
+        assert marker is not None
         assert expected is not None
-        assert found.digest == expected.digest
-        assert [store.get(file.key) for file in found.files] == [
-            files.get(f.key) for f in found.files
+        assert marker.digest == expected.digest
+        assert [store.get(file.key) for file in marker.files] == [
+            files.get(f.key) for f in marker.files
         ]
 
 
-def test_a_pack_written_anew_under_a_reader_gives_the_new_bytes() -> None:
+def test_a_pack_rewritten_under_a_reader_gives_the_new_bytes() -> None:
     store = prepared()
     reader = LaidOutStore(store.inner)
     view_done(store)
@@ -378,20 +380,20 @@ def test_a_later_layout_is_refused() -> None:
         LaidOutStore(inner).get(keys.view_key(HOUSE, VIEW, "radiance.exr"))
 
 
-def test_a_folder_is_packed_when_asked_and_known_as_such_after(tmp_path: Path) -> None:
+def test_a_folder_is_packed_on_request_and_recognised_later(tmp_path: Path) -> None:
     settings = StoreSettings(layout="packed")
     store = store_from_url(str(tmp_path / "root"), settings)
     prepared_store = prepared(store.inner if isinstance(store, LaidOutStore) else store)
     view_done(prepared_store)
-    found = store_from_url(str(tmp_path / "root"))
-    assert isinstance(found, LaidOutStore)
-    assert all_of(found) == all_of(prepared_store)
-    # As files: for verbs that read folders, and to keep.
+    reopened = store_from_url(str(tmp_path / "root"))
+    assert isinstance(reopened, LaidOutStore)
+    assert all_of(reopened) == all_of(prepared_store)
+    # As files: for verbs that read folders, and permanently.
     with as_files(str(tmp_path / "root"), replace(settings, layout="")) as folder:
         assert (folder / keys.view_key(HOUSE, VIEW, "depth.png")).read_bytes() == b"d" * 700
-    assert pull(found, tmp_path / "copy")[1] == 0
-    assert pull(found, tmp_path / "copy")[0] == 1  # the recipe
-    assert all_of(FolderStore(tmp_path / "copy")) == all_of(found)
+    assert pull(reopened, tmp_path / "copy")[1] == 0
+    assert pull(reopened, tmp_path / "copy")[0] == 1  # the recipe
+    assert all_of(FolderStore(tmp_path / "copy")) == all_of(reopened)
 
 
 def test_a_view_is_copied_from_one_layout_to_the_other() -> None:
@@ -405,7 +407,7 @@ def test_a_view_is_copied_from_one_layout_to_the_other() -> None:
     assert all_of(back) == all_of(files)
 
 
-def test_an_index_longer_than_what_is_read_at_first_is_read_whole() -> None:
+def test_an_index_longer_than_the_first_read_is_read_completely() -> None:
     store = packed()
     members = {f"layer_{n:04d}.png": b"x" for n in range(2000)}
     data = pack_bytes({"truth": {"done/truth.json": b"{}", **members}})

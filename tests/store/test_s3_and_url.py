@@ -1,4 +1,4 @@
-"""S3 without a network: the fork guard, clear errors, no secrets; and what a URL names."""
+"""S3 without a network: the fork guard, clear errors, no secrets; and the meaning of URLs."""
 
 from __future__ import annotations
 
@@ -63,7 +63,7 @@ def _child(queue: multiprocessing.Queue[str]) -> None:
 
 
 @pytest.mark.filterwarnings("ignore:.*multi-threaded.*fork:DeprecationWarning")
-def test_a_child_of_a_process_that_called_raises_and_does_not_hang() -> None:
+def test_a_forked_child_of_an_s3_client_raises_and_does_not_hang() -> None:
     with pytest.raises(StoreUnavailable):
         store_from_url("s3://b/p", DEAD).put("a", b"1")
     context = multiprocessing.get_context("fork")

@@ -98,14 +98,14 @@ def test_a_run_is_tuned_on_it_and_judged_beside_the_papers_tuned_row(
     assert "21.74" in text
     assert "NYUv2 (2)" in text
     assert "home (2)" in text
-    # Without splits.mat nobody knows which pictures trained.
+    # Without splits.mat the training pictures are unknown.
     (mat.parent / "splits.mat").unlink()
     assert main(["evaluate", tuned, "--on", str(mat)]) == 1
     assert "without splits.mat what trained would judge" in capsys.readouterr().err
     assert main(["evaluate", first, "--on", str(mat)]) == 0
 
 
-def test_what_training_on_it_needs_is_said(mat: Path) -> None:
+def test_missing_files_for_training_are_named(mat: Path) -> None:
     plan = small_plan()
     with pytest.raises(BadInput, match="NYUv2 cannot be combined"):
         training_views(TrainingSource((str(mat), "root")), plan)

@@ -1,4 +1,4 @@
-"""Normals of depth against known planes."""
+"""Normals from depth against known planes."""
 
 from __future__ import annotations
 
@@ -52,7 +52,7 @@ def test_two_planes_at_a_step_do_not_mix() -> None:
     )
 
 
-def test_nothing_is_trusted_where_depth_is_unknown_or_rough() -> None:
+def test_unknown_or_rough_depth_is_not_trusted() -> None:
     depth = np.full((120, 160), 2.0)
     depth[40:80, 40:80] = 0
     depth[:, 120:] = 2 + np.random.default_rng(1).normal(0, 0.06, (120, 40))

@@ -1,6 +1,6 @@
-"""The real Sweet Home 3D opens made homes and gives them back: `make test-sweethome3d`.
+"""The real Sweet Home 3D opens generated homes and saves them again: `make test-sweethome3d`.
 
-Needs Debian's sweethome3d, a JDK and Xvfb. The screenshots lie in out/sweethome3d/, to be looked at.
+Needs Debian's sweethome3d, a JDK and Xvfb. The screenshots are in out/sweethome3d/, for inspection.
 """
 
 from __future__ import annotations
@@ -59,8 +59,8 @@ def test_saved_again_a_home_reads_back_equal(homes: list[Path], tmp_path: Path) 
         assert [i.name for i in theirs.items] == [i.name for i in ours.items]
         for a, b in zip(ours.rooms, theirs.rooms, strict=True):
             np.testing.assert_allclose(a.polygon, b.polygon, atol=1e-4)
-        for one, other in zip(ours.items, theirs.items, strict=True):
-            np.testing.assert_allclose(one.bounds, other.bounds, atol=2e-3, err_msg=one.name)
+        for item, saved_item in zip(ours.items, theirs.items, strict=True):
+            np.testing.assert_allclose(item.bounds, saved_item.bounds, atol=2e-3, err_msg=item.name)
 
 
 def read(path: Path) -> House:
@@ -101,7 +101,7 @@ def test_a_home_opens_with_its_rooms_and_furniture(
 
 
 def opened(screen: str) -> np.ndarray:
-    """The screen when it shows much and stands still, or after the longest time."""
+    """The screen once it has many colours and is still, or after the time limit."""
     last, until = np.zeros((*SIZE[::-1], 3), np.uint8), time.monotonic() + OPEN_S
     while time.monotonic() < until:
         time.sleep(6)

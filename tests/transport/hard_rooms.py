@@ -1,4 +1,4 @@
-"""Rooms in which light is hard to find, for the Metropolis tests and benchmarks/light/shots.py."""
+"""Rooms whose light is hard to sample, for the Metropolis tests and benchmarks/light/shots.py."""
 
 from __future__ import annotations
 
@@ -41,14 +41,14 @@ def glass_globe(radius: float = 0.12) -> tuple[House, Camera]:
 def open_shade(*, n: int = 32, east: float = 0.0) -> tuple[House, Camera]:
     """A bulb deep in an opaque shade, open above and below, in a room with a window.
 
-    n: facets of the shade. east: m by which all of it is moved along +x.
+    n: facets of the shade. east: shift of everything along +x, metres.
     """
     surfaces = shell((4.0, 2.5, 4.0), 0, front=False)
     surfaces += panel((0, 0, -0.1), (4.0, 2.5, 0.0), (1.5, 1.0, 2.5, 2.0), 0)
     surfaces.append(cylinder((2.0, 1.3, 2.2), 0.12, 0.35, 1, n=n))
     surfaces.append(box((2.6, 0.0, 2.4), (3.4, 0.6, 3.2), 2, "block"))
-    there = np.array([east, 0, 0], np.float32)
-    surfaces = [replace(s, positions=s.positions + there) for s in surfaces]
+    shift = np.array([east, 0, 0], np.float32)
+    surfaces = [replace(s, positions=s.positions + shift) for s in surfaces]
     materials = [matte("wall", 0.7), matte("shade", 0.5), matte("block", 0.2, 0.5, 0.3), BULB]
     lamp = bulb((2.0 + east, 1.45, 2.2), 3, 800.0, radius=0.03)
     return (
@@ -58,7 +58,7 @@ def open_shade(*, n: int = 32, east: float = 0.0) -> tuple[House, Camera]:
 
 
 def covered_cup() -> tuple[House, Camera]:
-    """A bulb in a white cup in a globe of thin glass: light comes by way of the cup's inside."""
+    """A bulb in a white cup in a globe of thin glass: all light is reflected by the inside of the cup."""
     surfaces = shell((4.0, 2.5, 4.0), 0)
     surfaces.append(sphere((2.0, 1.5, 2.2), 0.12, 2, n=32))
     surfaces.append(cylinder((2.0, 1.42, 2.2), 0.06, 0.1, 3))
@@ -71,7 +71,7 @@ def covered_cup() -> tuple[House, Camera]:
 
 
 def sunlit() -> tuple[House, Camera]:
-    """A room with one window and nothing else; the sky decides."""
+    """A room with one window and no lamp, lit by the sky."""
     from pbrs_farm.transport.validation.known_rooms import window_room
 
     return window_room(0.7)

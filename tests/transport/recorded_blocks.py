@@ -1,6 +1,6 @@
-"""Light of four rooms as a CPU made it, in 16 blocks: what a GPU's is held against.
+"""Light of four rooms recorded on a CPU in 16 blocks, as the reference for a GPU.
 
-`python -m tests.transport.recorded_blocks` records it anew (LLVM).
+`python -m tests.transport.recorded_blocks` records it again (LLVM).
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ RECIPE: Final = recipe_from_name("fast")
 FIELDS: Final[LightFields] = RECIPE.light.model_copy(update={"filter": "box", "spp": 128})
 ROOMS: Final[dict[str, Callable[[], tuple[House, Camera]]]] = {
     "window": lambda: known_rooms.window_room(0.7, lumen=800),
-    "globe": hard_rooms.glass_globe,  # glass: shadow rays go through
+    "globe": hard_rooms.glass_globe,  # glass: shadow rays pass through
     "shade": hard_rooms.open_shade,  # guided rays
     "cup": hard_rooms.covered_cup,  # both
 }
@@ -46,15 +46,15 @@ def measured(
 
 
 def largest_z(room: str, found: dict[str, list[list[list[float]]]]) -> float:
-    """Of all blocks and groups against what was recorded; black groups must be black in both."""
+    """Largest z over all blocks and groups against the recording; black groups must be black in both."""
     recorded = json.loads(FILE.read_text())[room]
     largest = 0.0
     for group, theirs in recorded.items():
-        ours, held = np.array(found[group]), np.array(theirs)
-        if not held.any():
+        ours, expected = np.array(found[group]), np.array(theirs)
+        if not expected.any():
             assert not ours.any(), f"{group} light where there was none"
             continue
-        largest = max(largest, float(np.abs(z_scores(list(ours), list(held))).max()))
+        largest = max(largest, float(np.abs(z_scores(list(ours), list(expected))).max()))
     return largest
 
 

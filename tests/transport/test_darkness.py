@@ -1,4 +1,4 @@
-"""What counts as a dark room and as a black picture."""
+"""Thresholds for a dark room and a black picture."""
 
 from __future__ import annotations
 
@@ -17,12 +17,12 @@ def result(outdoor: np.ndarray, normal: np.ndarray | None = None) -> LightResult
     return LightResult(outdoor, none, none, hit, {}, 16, 0, {})
 
 
-def test_a_picture_without_light_is_black_and_one_by_a_candle_is_not() -> None:
+def test_a_picture_without_light_is_black_and_a_candlelit_one_is_not() -> None:
     assert darkness_of_picture(result(np.zeros(SHAPE, np.float32))).startswith("black")
     assert darkness_of_picture(result(np.full(SHAPE, 0.001, np.float32))) == ""
 
 
-def test_one_bright_pixel_leaves_a_picture_black() -> None:
+def test_a_picture_with_one_bright_pixel_is_black() -> None:
     firefly = np.zeros(SHAPE, np.float32)
     firefly[3, 4] = 1e6
     assert darkness_of_picture(result(firefly)) != ""
@@ -34,7 +34,7 @@ def test_noise_that_leaves_most_pixels_without_light_does_not_make_a_picture_bla
     assert darkness_of_picture(result(sparse.astype(np.float32))) == ""
 
 
-def test_a_small_object_on_nothing_is_judged_by_its_own_pixels() -> None:
+def test_a_small_object_on_an_empty_background_is_judged_by_its_pixels() -> None:
     image, normal = np.zeros(SHAPE, np.float32), np.zeros(SHAPE, np.float32)
     image[10:12, 10:12], normal[10:12, 10:12] = 1.0, 1.0
     assert darkness_of_picture(result(image, normal)) == ""

@@ -1,4 +1,4 @@
-"""Diffuse light of first surfaces is what arrives there, whatever the surface; shading and residual sum to light."""
+"""Diffuse light of first surfaces is the incident light, for any surface; shading and residual sum to light."""
 
 from __future__ import annotations
 
@@ -65,26 +65,26 @@ pytestmark = pytest.mark.skipif(choose_variant().startswith("scalar"), reason="n
     ],
     ids=lambda m: m.name,
 )
-def test_open_ground_has_the_skys_light_as_its_shading_whatever_it_is_made_of(material):
+def test_open_ground_of_any_material_has_the_skys_light_as_its_shading(material):
     result = split(ground(material), LOOK_DOWN, uniform_sky(SKY), FIELDS)
     # A white sky's irradiance over pi is its radiance.
-    found = shading(result)
-    np.testing.assert_allclose(found[Group.OUTDOOR].mean((0, 1)), SKY, rtol=0.03)
-    assert not found[Group.INDOOR].any()
+    shade = shading(result)
+    np.testing.assert_allclose(shade[Group.OUTDOOR].mean((0, 1)), SKY, rtol=0.03)
+    assert not shade[Group.INDOOR].any()
 
 
 def test_the_furnaces_residual_is_its_emission_and_its_shading_the_series():
     house, camera = rooms.furnace(0.5)
     result = split(house, camera, dark_sky(), FIELDS.model_copy(update={"max_depth": 6}))
-    found = shading(result)[Group.INDOOR]
-    # Light of 5 segments and fewer arrives: 1 + 1/2 + ... + 1/16.
-    assert (found @ LUMINANCE).mean() == pytest.approx(1.9375, rel=0.01)
-    left = result.indoor - np.float32(0.5) * found
-    np.testing.assert_allclose(left @ LUMINANCE, 1.0, rtol=1e-3)
+    shade = shading(result)[Group.INDOOR]
+    # Light of up to 5 segments arrives: 1 + 1/2 + ... + 1/16.
+    assert (shade @ LUMINANCE).mean() == pytest.approx(1.9375, rel=0.01)
+    emission = result.indoor - np.float32(0.5) * shade
+    np.testing.assert_allclose(emission @ LUMINANCE, 1.0, rtol=1e-3)
 
 
 @pytest.mark.parametrize("first", [MIRROR, GLASS], ids=lambda m: m.name)
-def test_mirrors_and_glass_have_no_shading_nor_what_lies_behind_them(first):
+def test_mirrors_and_glass_and_surfaces_behind_them_have_no_shading(first):
     sheet = ground(rooms.matte("grey", 0.5), first)
     result = split(sheet, LOOK_DOWN, uniform_sky(SKY), FIELDS)
     assert result.outdoor.min() > 0.1
@@ -96,23 +96,24 @@ def test_light_is_the_same_as_without_and_is_kept_by_lamp():
     fields = FIELDS.model_copy(update={"spp": 8, "groups": "lamps"})
     scene = LightScene.load(house, {}, RECIPE, uniform_sky(SKY))
     plain = scene.render(camera, "0_0", fields, 1)
-    found = scene.render(camera, "0_0", fields, 1, splits_diffuse=True)
+    split = scene.render(camera, "0_0", fields, 1, splits_diffuse=True)
     assert not plain.diffuse
-    # All is matte and light but the black bulb: paths are those of the plain render, all light is diffuse.
+    # All surfaces are matte and light except the black bulb: paths equal those of the plain render,
+    # all light is diffuse.
     for group in ("outdoor", "indoor"):
-        np.testing.assert_allclose(getattr(found, group), getattr(plain, group), rtol=2e-3)
-    is_matte = (found.diffuse[ALBEDO] > 0.699).all(-1)
+        np.testing.assert_allclose(getattr(split, group), getattr(plain, group), rtol=2e-3)
+    is_matte = (split.diffuse[ALBEDO] > 0.699).all(-1)
     np.testing.assert_allclose(
-        found.diffuse["diffuse_indoor"][is_matte], found.indoor[is_matte], rtol=1e-4, atol=1e-6
+        split.diffuse["diffuse_indoor"][is_matte], split.indoor[is_matte], rtol=1e-4, atol=1e-6
     )
-    (lamp,) = found.lamps
+    (lamp,) = split.lamps
     np.testing.assert_allclose(
-        found.diffuse[f"diffuse_lamp{lamp}"], found.diffuse["diffuse_indoor"], rtol=1e-5, atol=1e-7
+        split.diffuse[f"diffuse_lamp{lamp}"], split.diffuse["diffuse_indoor"], rtol=1e-5, atol=1e-7
     )
     assert is_matte.mean() > 0.9
 
 
-def test_shading_is_refused_where_there_is_none():
+def test_shading_is_refused_if_there_is_none():
     house, camera = rooms.furnace(0.5)
     metropolis = FIELDS.model_copy(update={"integrator": "metropolis"})
     with pytest.raises(RenderFailed, match="shading and residual need `path`"):
@@ -130,6 +131,6 @@ def test_albedo_times_shading_plus_residual_is_radiance_within_half_floats():
     stored, residual = intrinsic_parts(radiance, albedo, light)
     assert stored.dtype == residual.dtype == np.float16
     again = albedo * stored.astype(np.float64) + residual
-    rounding = 1e-6 * (radiance + albedo * stored)  # of single precision
+    rounding = 1e-6 * (radiance + albedo * stored)  # of float32
     step = np.maximum(np.abs(residual.astype(np.float64)), 2.0**-14) * 2.0**-11
     assert (np.abs(again - radiance) <= step * 1.01 + rounding).all()

@@ -1,4 +1,4 @@
-"""The same light, labels and pictures on a GPU as on a CPU; `scripts/gpu_check.sh` runs those marked gpu."""
+"""Equal light, labels and pictures on a GPU and a CPU; `scripts/gpu_check.sh` runs those marked gpu."""
 
 from __future__ import annotations
 
@@ -26,8 +26,8 @@ DENOISER = find_spec("pyoidn") is not None
 
 @pytest.mark.long
 @needs_kernels
-def test_one_scene_for_all_rays_makes_the_same_picture() -> None:
-    # What a GPU needs (OptiX traces one scene in a kernel), proved where it can be run.
+def test_one_scene_for_all_rays_gives_the_same_picture() -> None:
+    # A requirement of GPUs (OptiX traces one scene per kernel), tested on the CPU.
     from pbrs_farm.transport.kernels.device_scene import DeviceScene
 
     house, camera = hard_rooms.covered_cup()
@@ -37,11 +37,11 @@ def test_one_scene_for_all_rays_makes_the_same_picture() -> None:
         scene.device_scene = DeviceScene(scene.tables, one_scene=one_scene)
         fields = FIELDS.model_copy(update={"spp": 16})
         pictures.append(scene.render(camera.with_size(32, 24), "0_0", fields, 1).indoor)
-    # A shadow ray that goes through glass starts anew a little beside: a few samples may differ.
-    two, one = pictures
+    # A shadow ray through glass restarts slightly displaced: a few samples may differ.
+    two, single = pictures
     assert float(two.mean()) > 0
-    assert float(one.mean()) == pytest.approx(float(two.mean()), rel=1e-3)
-    assert np.isclose(one, two, rtol=1e-4, atol=1e-7).all(-1).mean() > 0.97
+    assert float(single.mean()) == pytest.approx(float(two.mean()), rel=1e-3)
+    assert np.isclose(single, two, rtol=1e-4, atol=1e-7).all(-1).mean() > 0.97
 
 
 @needs_kernels
@@ -64,7 +64,7 @@ def test_light_is_as_it_was_recorded() -> None:
 
 
 @pytest.mark.gpu
-def test_the_gpu_is_what_is_used() -> None:
+def test_the_gpu_is_used() -> None:
     assert choose_variant() == "cuda_ad_rgb"
 
 
@@ -100,7 +100,7 @@ def test_metropolis_on_the_gpu_makes_few_launches_and_compiles_nothing_for_anoth
 
 
 @pytest.mark.gpu
-def test_opengl_through_egl_draws_on_the_gpu_what_rays_see() -> None:
+def test_opengl_through_egl_agrees_with_rays_on_the_gpu() -> None:
     from pbrs_farm.core.camera import Camera, Intrinsics
     from pbrs_farm.raster import Rasterizer
     from pbrs_farm.raycast.caster import Caster
@@ -111,12 +111,12 @@ def test_opengl_through_egl_draws_on_the_gpu_what_rays_see() -> None:
     camera = Camera.look(Intrinsics.from_hfov(320, 240), stored.eye, stored.towards)
     with Rasterizer(house, {}) as raster:
         assert "NVIDIA" in raster.name
-    seen = Caster(geometry_from_house(house), variant="scalar_rgb").hit_record(camera).item
-    assert (items_drawn(house, camera) == seen)[seen > 0].mean() > 0.98
+    hit_items = Caster(geometry_from_house(house), variant="scalar_rgb").hit_record(camera).item
+    assert (items_drawn(house, camera) == hit_items)[hit_items > 0].mean() > 0.98
 
 
 @pytest.mark.gpu
-def test_labels_of_the_gpu_differ_from_those_of_the_cpu_in_no_more_than_edges() -> None:
+def test_labels_of_the_gpu_differ_from_those_of_the_cpu_only_at_edges() -> None:
     from pbrs_farm.core.camera import Camera, Intrinsics
     from pbrs_farm.raycast.caster import Caster
 
@@ -143,7 +143,7 @@ def test_a_preview_of_a_home_is_whole(tmp_path: Path) -> None:
     from pbrs_farm.run.local_run import Run
     from pbrs_farm.run.plan import wanted
 
-    # Without the denoiser, where scripts/gpu_check.sh was given no archive of it.
+    # Without the denoiser if scripts/gpu_check.sh has no archive of it.
     recipe = recipe_from_name("preview", {"light.denoise": str(DENOISER).lower()})
     summary = run_local(Run(["builtin"], str(tmp_path), recipe, wanted([], [], 2)))
     assert summary.failures == []

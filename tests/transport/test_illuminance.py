@@ -32,7 +32,7 @@ def test_open_ground_has_the_illuminance_of_the_recipe() -> None:
     assert lux["indoor"] == 0
 
 
-def test_a_black_room_has_the_direct_light_of_its_bulb_alone() -> None:
+def test_a_black_room_has_only_the_direct_light_of_its_bulb() -> None:
     surfaces = rooms.shell((4.0, 2.5, 4.0), 0)
     bulb = rooms.bulb((2.0, 2.05, 2.0), 1, 1000.0)
     house = rooms.house(surfaces, [rooms.matte("wall", 0.0), rooms.BULB], lamps=[bulb])

@@ -1,4 +1,4 @@
-"""Light by the lamp it comes from: one trace, layers that sum to indoor, nothing else changed."""
+"""Light by lamp: one trace, layers that sum to indoor, everything else unchanged."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ LAMPS: LightFields = TWO.model_copy(update={"groups": "lamps"})
 
 
 def three_lamps(lumen: tuple[float, float] = (800.0, 300.0)) -> tuple[House, Camera]:
-    """The room with a window, a lamp at its ceiling, one on its table, one behind its back wall."""
+    """The room with a window, a ceiling lamp, a table lamp, and a lamp behind the back wall."""
     house, camera = rooms.window_room()
     table = replace(rooms.bulb((2.0, 0.9, 2.5), 1, lumen[1]), id="table_lamp")
     lamps = [rooms.bulb((2.0, 2.2, 2.0), 1, lumen[0]), rooms.bulb((1.0, 1.0, 9.0), 1, 800.0), table]
@@ -47,7 +47,7 @@ def rendered(
 
 
 @needs_kernels
-def test_the_lamps_sum_to_indoor_to_the_bit_and_one_behind_a_wall_has_no_layer() -> None:
+def test_the_lamps_sum_to_indoor_exactly_and_a_hidden_lamp_has_no_layer() -> None:
     result = rendered(LAMPS)
     assert sorted(result.lamps) == [1, 3]
     np.testing.assert_array_equal(result.indoor, result.lamps[1] + result.lamps[3])
@@ -65,7 +65,7 @@ def test_the_lamps_sum_to_indoor_to_the_bit_and_one_behind_a_wall_has_no_layer()
 @needs_kernels
 @pytest.mark.parametrize("noise", [0.0, 1e-6])
 def test_layers_of_lamps_change_nothing_but_the_rounding_of_indoor(noise: float) -> None:
-    # In one pass of 16 samples, and in four when a noise is asked for that is never reached.
+    # One pass of 16 samples, and four passes for a noise level that is never reached.
     goal = {"noise": noise, "max_spp": 64}
     two, lamps = (rendered(f.model_copy(update=goal)) for f in (TWO, LAMPS))
     assert two.lamps == {}
@@ -81,13 +81,13 @@ def test_layers_of_lamps_change_nothing_but_the_rounding_of_indoor(noise: float)
 def test_a_lamps_layer_is_the_room_with_the_other_lamps_out_to_the_bit() -> None:
     # Without the pilot the same random numbers choose the same lamps in both rooms.
     fields = LAMPS.model_copy(update={"pilot_spp": 0})
-    both = rendered(fields)
+    all_lamps = rendered(fields)
     for number, lumen in ((1, (800.0, 0.0)), (3, (0.0, 300.0))):
         alone = rendered(fields, three_lamps(lumen))
         assert sorted(alone.lamps) == [number]
-        np.testing.assert_array_equal(alone.indoor, both.lamps[number])
+        np.testing.assert_array_equal(alone.indoor, all_lamps.lamps[number])
         plain = rendered(fields.model_copy(update={"groups": "two"}), three_lamps(lumen))
-        np.testing.assert_allclose(plain.indoor, both.lamps[number], rtol=1e-5, atol=1e-9)
+        np.testing.assert_allclose(plain.indoor, all_lamps.lamps[number], rtol=1e-5, atol=1e-9)
 
 
 @pytest.mark.long
@@ -96,14 +96,14 @@ def test_the_pilot_moves_samples_between_lamps_and_no_light() -> None:
     # Significance: 16 blocks, |z| < 4.5 each is missed by chance once in 9000 runs.
     fields = LAMPS.model_copy(update={"spp": 64})
     for number, lumen in ((1, (800.0, 0.0)), (3, (0.0, 300.0))):
-        both = [rendered(fields, seed=k).lamps[number] for k in range(4)]
+        layers = [rendered(fields, seed=k).lamps[number] for k in range(4)]
         alone = [rendered(fields, three_lamps(lumen), seed=50 + k).indoor for k in range(4)]
-        assert np.abs(z_scores([blocks(b) for b in both], [blocks(a) for a in alone])).max() < 4.5
-        assert np.mean(both) == pytest.approx(np.mean(alone), rel=0.05)
+        assert np.abs(z_scores([blocks(b) for b in layers], [blocks(a) for a in alone])).max() < 4.5
+        assert np.mean(layers) == pytest.approx(np.mean(alone), rel=0.05)
 
 
 @needs_kernels
-def test_what_is_not_finite_reaches_no_layer_and_is_counted() -> None:
+def test_nonfinite_light_is_counted_and_kept_out_of_layers() -> None:
     result = rendered(LAMPS, three_lamps((math.inf, 300.0)))
     assert result.n_nonfinite > 0
     assert sorted(result.lamps) == [3]
@@ -112,7 +112,7 @@ def test_what_is_not_finite_reaches_no_layer_and_is_counted() -> None:
 
 
 @needs_kernels
-def test_a_house_without_lamps_has_none_to_list() -> None:
+def test_a_house_without_lamps_lists_none() -> None:
     result = rendered(LAMPS, rooms.window_room())
     assert (result.lamps, result.facts["lamps"]) == ({}, [])
     assert not result.indoor.any()
@@ -128,14 +128,14 @@ def test_the_same_seed_gives_the_same_layers_and_another_house_compiles_nothing(
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         dr.kernel_history_clear()
         again = rendered(LAMPS)
-        other = rendered(LAMPS, (more, camera))
+        second = rendered(LAMPS, (more, camera))
         kernels = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
     tracing = [k for k in kernels if k["operation_count"] > 1000]
     for number, layer in first.lamps.items():
         np.testing.assert_array_equal(layer, again.lamps[number])
-    assert sorted(other.lamps) == [1, 3, 4]
-    # Lamps' insides, the pilot and the picture, twice; copies of arrays may differ by how their
-    # memory is aligned.
+    assert sorted(second.lamps) == [1, 3, 4]
+    # Kernels for the insides of lamps, the pilot and the picture, twice; copies of arrays may
+    # differ with the alignment of memory.
     assert len(tracing) == 6
     assert all(k["cache_hit"] for k in tracing)
 
@@ -147,7 +147,9 @@ def test_more_sums_than_the_kernel_can_count_are_refused(monkeypatch: pytest.Mon
         rendered(LAMPS)
 
 
-def test_a_scalar_variant_says_what_light_by_lamp_needs(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_light_by_lamp_is_refused_for_a_scalar_variant_with_the_reason(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
     house, camera = three_lamps()
     scene = LightScene.load(house, {}, RECIPE, uniform_sky((1, 1, 1)))
     monkeypatch.setattr(scene, "variant", "scalar_rgb")

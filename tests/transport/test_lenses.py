@@ -1,4 +1,4 @@
-"""Light goes through the same lens as labels, black where a pixel has no ray; blur moves light alone."""
+"""Light uses the same lens as labels, black where a pixel has no ray; blur moves only light."""
 
 from __future__ import annotations
 
@@ -45,7 +45,7 @@ def test_light_and_labels_see_the_same_surface_through_a_lens(name: str) -> None
     camera = camera_of(name)
     result = rendered(camera)
     hit = Caster(geometry_from_house(HOUSE)).hit_record(camera)
-    # Where the walls of a closed room meet, a pixel's mean normal lies between theirs.
+    # Where the walls of a closed room meet, a pixel's mean normal is between theirs.
     agree = np.einsum("...i,...i->...", result.normal, hit.geo_normal_world) > 0.999
     assert agree[hit.valid].mean() > 0.85
     blind = camera.blind
@@ -70,7 +70,7 @@ def test_one_kernel_traces_every_lens() -> None:
     import drjit as dr
 
     scene = LightScene.load(HOUSE, {}, RECIPE, dark_sky())
-    scene.render(camera_of("kinect"), "0_0", FIELDS, 1)  # the first one builds the emitters
+    scene.render(camera_of("kinect"), "0_0", FIELDS, 1)  # the first render builds the emitters
     traced = []
     for name in SIZES:
         dr.kernel_history_clear()
@@ -84,7 +84,7 @@ def test_one_kernel_traces_every_lens() -> None:
 
 
 def edge_spread(blur: CameraBlur | None) -> float:
-    """Standard deviation in px of the edge between a black and a white wall 2 m before a camera."""
+    """Standard deviation in px of the edge between a black and a white wall 2 m from the camera."""
     wall = [
         rooms.quad([(x, -9, 0), (x + 9, -9, 0), (x + 9, 9, 0), (x, 9, 0)], k)
         for k, x in enumerate((-9, 0))
@@ -94,7 +94,7 @@ def edge_spread(blur: CameraBlur | None) -> float:
     scene = LightScene.load(house, {}, RECIPE, uniform_sky(1.0))
     fields = FIELDS.model_copy(update={"spp": 256})
     albedo = scene.render(camera, "0_0", fields, 1).albedo[..., 0].mean(0)
-    # The slope of the profile is the spread's own shape.
+    # The slope of the profile has the shape of the spread.
     slope, place = np.abs(np.diff(albedo)), np.arange(95)
     slope[slope < 0.02 * slope.max()] = 0
     middle = (slope * place).sum() / slope.sum()
@@ -104,11 +104,11 @@ def edge_spread(blur: CameraBlur | None) -> float:
 FOCAL_PX = 48 / math.tan(0.3)
 
 
-def test_what_is_out_of_focus_spreads_by_the_circle_of_confusion() -> None:
+def test_unfocused_points_spread_by_the_circle_of_confusion() -> None:
     sharp = edge_spread(CameraBlur(aperture_radius_m=0.03, focus_m=2.0))
     assert sharp < 0.6
     blurred = edge_spread(CameraBlur(aperture_radius_m=0.03, focus_m=1.0))
-    # A disk's projection has a quarter of its diameter as deviation.
+    # The standard deviation of a disk's projection is a quarter of its diameter.
     diameter = FOCAL_PX * 0.06 * abs(1 / 2.0 - 1 / 1.0)
     assert blurred == pytest.approx(diameter / 4, rel=0.12)
 
@@ -127,17 +127,17 @@ def test_a_rolling_shutter_shears_an_upright_edge_and_keeps_it_sharp() -> None:
         for k, x in enumerate((-9, 0))
     ]
     house = rooms.house(wall, [rooms.matte("black", 0.0), rooms.matte("white", 0.8)])
-    # The camera goes 0.1 m to the right from the first row's light to the last one's.
+    # The camera moves 0.1 m to the right between the exposures of the first and last rows.
     blur = CameraBlur(velocity_m=(0.1, 0.0, 0.0), open_share=0.0, rolling_share=1.0)
     camera = replace(rooms.camera((0, 0, 2), (0, 0, 0), 96, 64, 0.6), blur=blur)
     scene = LightScene.load(house, {}, RECIPE, uniform_sky(1.0))
     fields = FIELDS.model_copy(update={"spp": 64})
     albedo = scene.render(camera, "0_0", fields, 1).albedo[..., 0]
-    # White is right of the edge: black pixels of a row count up to it.
+    # White is right of the edge: the edge's column is the number of black pixels in a row.
     edge = 96 - albedo.sum(1) / albedo.max()
     row = np.arange(64) + 0.5
     expected = 48 - FOCAL_PX * 0.1 / 2 * (row / 64 - 0.5)
     assert np.abs(edge - expected).max() < 0.15
-    # No pixel but the edge's own is between black and white.
+    # Only the edge's pixel is between black and white.
     between = (albedo > 0.05 * albedo.max()) & (albedo < 0.95 * albedo.max())
     assert between.sum(1).max() <= 2

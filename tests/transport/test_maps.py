@@ -1,4 +1,4 @@
-"""Roughness and normal maps in the light: closed forms, energy, and Mitsuba's own plugins."""
+"""Roughness and normal maps in the light: closed forms, energy, and Mitsuba's plugins."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ FLAT: Picture = np.full((4, 4, 3), (128, 128, 255), np.uint8)
 
 
 def one_normal(x: float, y: float) -> Picture:
-    """A normal map of one normal everywhere."""
+    """A normal map with the same normal everywhere."""
     normal = np.array([x, y, math.sqrt(1 - x * x - y * y)])
     return np.full((2, 2, 3), np.round((normal + 1) * 127.5), np.uint8)
 
@@ -48,7 +48,7 @@ def floor(
 
 
 def sun(direction: tuple[float, float, float]) -> Sky:
-    """A sun of irradiance 1 and nothing else."""
+    """A sky with only a sun of irradiance 1."""
     d = np.array(direction) / np.linalg.norm(direction)
     dark = dark_sky()
     return replace(dark, sun_direction=d, sun_irradiance=np.ones(3))
@@ -74,7 +74,7 @@ MIRRORED = UPRIGHT * [-1, 1]
     ],
 )
 @pytest.mark.parametrize("bent", [(0.5, 0.0), (0.0, 0.5)])
-def test_a_tilted_normal_takes_the_sun_by_its_own_cosine(
+def test_a_tilted_normal_receives_the_sun_by_its_cosine(
     uvs: np.ndarray, x_axis: tuple[float, ...], y_axis: tuple[float, ...], bent: tuple[float, float]
 ) -> None:
     house, camera = floor(uvs)
@@ -89,10 +89,8 @@ def test_a_tilted_normal_takes_the_sun_by_its_own_cosine(
 
 
 @pytest.mark.parametrize("degrees", [0.0, 30.0, 60.0])
-def test_a_tilted_normal_under_a_uniform_sky_sees_what_the_floor_leaves_of_it(
-    degrees: float,
-) -> None:
-    # The sky above the horizon that a plane tilted by t sees: (1 + cos t) / 2.
+def test_a_tilted_normal_under_a_uniform_sky_sees_its_share(degrees: float) -> None:
+    # A plane tilted by t sees a share (1 + cos t) / 2 of the sky above the horizon.
     house, camera = floor()
     maps = {"n": one_normal(math.sin(math.radians(degrees)), 0)}
     got = mean_outdoor(house, camera, maps, uniform_sky((1, 1, 1)))
@@ -109,7 +107,7 @@ def test_the_scale_flattens_the_map_and_no_texture_coordinates_switch_it_off() -
 
 @pytest.mark.quick(1)
 @pytest.mark.parametrize("roughness", [None, 0.3, 1.0])
-def test_a_furnace_stays_what_it_is_behind_a_flat_map_and_never_gains_by_bumps(
+def test_a_furnace_is_unchanged_by_a_flat_map_and_gains_nothing_by_bumps(
     roughness: float | None,
 ) -> None:
     means = {}
@@ -132,7 +130,7 @@ def test_a_furnace_stays_what_it_is_behind_a_flat_map_and_never_gains_by_bumps(
 
 
 def mapped_room(**changes: object) -> tuple[House, Camera]:
-    """The window room, a bulb in it, whose walls and table have maps."""
+    """The window room with a bulb, whose walls and table have maps."""
     house, camera = rooms.window_room(0.6, lumen=800)
     maps = {"normal_texture_id": "n", "roughness_texture_id": "r"} | changes
     return with_material(house, **maps), camera
@@ -145,17 +143,17 @@ MAPS = {"n": waves(0.35), "r": np.tile(np.linspace(60, 255, 32).astype(np.uint8)
 @pytest.mark.parametrize("group", list(Group))
 def test_bumpy_matte_walls_agree_with_mitsubas_normalmap(group: Group) -> None:
     # Significance: 16 blocks, |z| < 4.5 each is missed by chance once in 9000 runs. Two segments:
-    # from below the horizon of a bump Mitsuba sees black, we see its rim (bend_normal).
+    # below the horizon of a bump Mitsuba sees black, ours its rim (bend_normal).
     house, camera = mapped_room(roughness_texture_id=None)
     camera = rooms.camera((2.0, 2.3, 2.6), (2.0, 0.0, 2.0), 32, 24, 0.8)
     scene = LightScene.load(house, MAPS, RECIPE, uniform_sky((1, 1, 1)))
-    other = ScalarScene(scene.tables, scene.sky, scene.variant)
+    scalar = ScalarScene(scene.tables, scene.sky, scene.variant)
     fields = FIELDS.model_copy(update={"spp": 256, "pilot_spp": 4, "max_depth": 2})
     ours = [blocks(scene.render(camera, "0_0", fields, k).group(group)) for k in range(4)]
-    theirs = [blocks(other.render(camera, group, fields, 100 + k)) for k in range(4)]
+    theirs = [blocks(scalar.render(camera, group, fields, 100 + k)) for k in range(4)]
     assert np.abs(z_scores(ours, theirs)).max() < 4.5
     assert np.mean(ours) == pytest.approx(np.mean(theirs), rel=0.02)
-    # The bumps are there: without them the picture is another one.
+    # The bumps have an effect: without them the picture differs.
     plain = LightScene.load(house, {}, RECIPE, uniform_sky((1, 1, 1)))
     flat = [blocks(plain.render(camera, "0_0", fields, k).group(group)) for k in range(4)]
     assert np.abs(z_scores(ours, flat)).max() > 20
@@ -163,15 +161,16 @@ def test_bumpy_matte_walls_agree_with_mitsubas_normalmap(group: Group) -> None:
 
 @pytest.mark.long
 def test_bumpy_metal_of_mapped_roughness_agrees_with_mitsubas_roughconductor() -> None:
-    # Theirs shadows and masks each by itself, ours together: a little brighter at grazing angles.
+    # Mitsuba's shadowing and masking are uncorrelated, ours are correlated: brighter at grazing
+    # angles.
     metal = {"diffuse": (0.0, 0.0, 0.0), "specular": (1.0, 1.0, 1.0), "roughness": 0.8}
     house, _camera = mapped_room(**metal)
     camera = rooms.camera((2.0, 2.3, 2.6), (2.0, 0.0, 2.0), 32, 24, 0.8)
     scene = LightScene.load(house, MAPS, RECIPE, uniform_sky((1, 1, 1)))
-    other = ScalarScene(scene.tables, scene.sky, scene.variant)
+    scalar = ScalarScene(scene.tables, scene.sky, scene.variant)
     fields = FIELDS.model_copy(update={"spp": 512, "pilot_spp": 4, "max_depth": 2})
     ours = np.mean([blocks(scene.render(camera, "0_0", fields, k).indoor) for k in range(4)], 0)
-    theirs = np.mean([blocks(other.render(camera, Group.INDOOR, fields, k)) for k in range(4)], 0)
+    theirs = np.mean([blocks(scalar.render(camera, Group.INDOOR, fields, k)) for k in range(4)], 0)
     np.testing.assert_allclose(ours, theirs, rtol=0.08)
     assert ours.mean() == pytest.approx(theirs.mean(), rel=0.02)
 
@@ -191,14 +190,14 @@ def test_the_metal_lobe_is_mitsubas_roughconductor_but_for_joint_shadowing(alpha
     si = mi.SurfaceInteraction3f()
     si.wi = mi.Vector3f(wi)
     theirs = mi.load_dict(plugin).eval(mi.BSDFContext(), si, mi.Vector3f(wo))
-    # G2 = 1 / (1 + a + b) where theirs is 1 / ((1 + a)(1 + b)) (Heitz 2014, section 5.3).
+    # Ours is G2 = 1 / (1 + a + b), theirs 1 / ((1 + a)(1 + b)) (Heitz 2014, section 5.3).
     a, b = (0.5 * (np.sqrt(1 + alpha**2 * (1 - w[2] ** 2) / w[2] ** 2) - 1) for w in (wi, wo))
     joint = (1 + a) * (1 + b) / (1 + a + b)
     np.testing.assert_allclose(ours[0].numpy(), theirs[0].numpy() * joint, rtol=2e-3, atol=1e-6)
 
 
 @pytest.mark.slow
-def test_metropolis_and_path_have_one_mean_where_coats_are_bumpy() -> None:
+def test_metropolis_and_path_have_the_same_mean_on_bumpy_coats() -> None:
     # Significance: 16 blocks of each group, |z| < 5: missed by chance once in 50,000 runs.
     house, camera = mapped_room(roughness=0.8)
     scene = LightScene.load(house, MAPS, RECIPE, uniform_sky((1, 1, 1)))
@@ -213,7 +212,7 @@ def test_metropolis_and_path_have_one_mean_where_coats_are_bumpy() -> None:
         assert np.mean(ours) == pytest.approx(np.mean(theirs), rel=0.05)
 
 
-def test_a_house_with_maps_compiles_nothing_that_one_without_has_not() -> None:
+def test_a_house_with_maps_compiles_no_further_kernels() -> None:
     import drjit as dr
 
     house, camera = rooms.window_room(lumen=800)

@@ -1,4 +1,4 @@
-"""Light of a home in which a door opens: at each time that of a home whose door stands there."""
+"""Light of a home with an opening door equals, at each time, that of a home with the door in that pose."""
 
 from __future__ import annotations
 
@@ -50,7 +50,7 @@ def before_the_door(house: House) -> Camera:
 
 
 @pytest.mark.long
-def test_light_at_a_time_is_that_of_a_home_that_stands_there() -> None:
+def test_light_at_a_time_equals_that_of_a_home_in_that_pose() -> None:
     moving = home()
     camera = before_the_door(moving)
     scene = scene_of(moving)
@@ -61,12 +61,12 @@ def test_light_at_a_time_is_that_of_a_home_that_stands_there() -> None:
     assert stopped.mean() > 0
     np.testing.assert_allclose(opened, stopped, rtol=1e-4, atol=1e-4 * stopped.max())
     assert np.abs(opened - shut).mean() > 0.02 * shut.mean()
-    # At rest again it is what it was.
+    # Back at rest the light is as before.
     scene.move_to(None)
     np.testing.assert_array_equal(picture(scene, camera), shut)
 
 
-def test_a_lamp_that_moves_is_told() -> None:
+def test_a_moving_lamp_is_reported() -> None:
     house = home()
     lamp = next(item for item in house.items if item.lights)
     falls = Motion(lamp.id, "", (0.0,), ((0, 0, 0, 1, 0, 0, 0),))
@@ -80,7 +80,7 @@ SHUTTER_S = 0.5
 
 
 def panel_that_moves() -> tuple[House, Camera]:
-    """A black panel 2 m before a camera, which moves to the right at .4 m/s before a white wall."""
+    """A black panel 2 m from a camera, moving to the right at .4 m/s in front of a white wall."""
     wall = rooms.quad([(-9, -9, -0.5), (9, -9, -0.5), (9, 9, -0.5), (-9, 9, -0.5)], 1)
     panel = rooms.quad([(-9, -9, 0), (0, -9, 0), (0, 9, 0), (-9, 9, 0)], 0)
     item = Item("panel", "panel", ItemKind.WALL, "0", (panel,), room_id="0_0")
@@ -97,17 +97,17 @@ def albedo_rows(scene: LightScene, camera: Camera, spp: int, shutter_s: float = 
     return np.asarray(result.albedo[..., 0].mean(0))
 
 
-def test_a_thing_that_moves_while_the_shutter_is_open_is_blurred_about_its_middle() -> None:
+def test_an_item_moving_during_the_shutter_is_blurred_about_its_middle() -> None:
     house, camera = panel_that_moves()
     scene = LightScene.load(house, {}, RECIPE, uniform_sky(1.0))
     scene.move_to(1.0)
     blurred = albedo_rows(scene, replace(camera, blur=CameraBlur()), 64, SHUTTER_S)
-    # At 1 s the edge stands at .4 m, the picture's middle, and goes .2 m while the shutter is open: each
-    # column is dark for as long as the panel is before it.
+    # At 1 s the edge is at .4 m, the picture's middle, and moves .2 m while the shutter is open: a
+    # column is dark for as long as the panel covers it.
     width = FOCAL_PX * 0.4 * SHUTTER_S / 2
     expected = 0.8 * np.clip((np.arange(96) + 0.5 - 48) / width + 0.5, 0, 1)
     assert np.abs(blurred - expected).max() < 0.06
-    # Sixteen instants: the mean of many sharp pictures over the shutter's time.
+    # Sixteen instants: the mean of many sharp pictures over the shutter time.
     sharp = []
     for k in range(32):
         scene.move_to(1.0 + SHUTTER_S * ((k + 0.5) / 32 - 0.5))
@@ -116,17 +116,17 @@ def test_a_thing_that_moves_while_the_shutter_is_open_is_blurred_about_its_middl
     assert np.abs(blurred - sharp[16]).max() > 0.3
 
 
-def test_a_camera_that_goes_along_sees_a_moving_thing_sharp() -> None:
+def test_a_camera_that_follows_an_item_sees_it_sharp() -> None:
     house, camera = panel_that_moves()
     scene = LightScene.load(house, {}, RECIPE, uniform_sky(1.0))
     scene.move_to(1.0)
     along = CameraBlur(velocity_m=(0.4 * SHUTTER_S, 0.0, 0.0))
     rows = albedo_rows(scene, replace(camera, blur=along), 64, SHUTTER_S)
-    # Within each of 16 instants the camera alone goes on, by a sixteenth of 14.5 px.
+    # Within each of 16 instants only the camera moves, by a sixteenth of 14.5 px.
     assert ((rows > 0.05) & (rows < 0.75)).sum() <= 2
 
 
-def test_the_scene_stands_at_its_time_after_a_blurred_picture() -> None:
+def test_the_scene_is_at_its_time_after_a_blurred_picture() -> None:
     house, camera = panel_that_moves()
     scene = LightScene.load(house, {}, RECIPE, uniform_sky(1.0))
     scene.move_to(1.0)
@@ -136,7 +136,7 @@ def test_the_scene_stands_at_its_time_after_a_blurred_picture() -> None:
 
 
 @pytest.mark.parametrize("spp", [1, 2, 10, 28, 50, 64])
-def test_samples_are_spread_over_the_shutters_time_whatever_their_number(spp: int) -> None:
+def test_any_number_of_samples_is_spread_over_the_shutters_time(spp: int) -> None:
     moved: list[float] = []
     fields = RECIPE.light.model_copy(update={"spp": spp})
     camera = replace(panel_that_moves()[1], blur=CameraBlur())
@@ -144,7 +144,7 @@ def test_samples_are_spread_over_the_shutters_time_whatever_their_number(spp: in
     whole = list(parts_of_shutter(view, 0, spp))
     assert sum(n for _first, n, _camera in whole) == spp
     assert len(whole) <= MOST_PARTS
-    # Each part is as long as it has samples, and things stand in its middle.
+    # Each interval is proportional to its samples, and items have the pose of its middle.
     parts = sorted(
         (middle, n / spp, c.blur.open_share)
         for middle, (_first, n, c) in zip(moved, whole, strict=True)
@@ -153,7 +153,7 @@ def test_samples_are_spread_over_the_shutters_time_whatever_their_number(spp: in
     ends = np.cumsum([share for _middle, share, _open in parts])
     np.testing.assert_allclose([p[2] for p in parts], [p[1] for p in parts])
     np.testing.assert_allclose([p[0] for p in parts], ends - [0.5 * p[1] for p in parts])
-    # Launches of other sizes give each sample the same part.
+    # With other launch sizes each sample has the same interval.
     moved_before, moved[:] = list(moved), []
     pieces = [p for k in range(0, spp, 3) for p in parts_of_shutter(view, k, min(3, spp - k))]
     by_sample = [m for m, (_f, n, _c) in zip(moved, pieces, strict=True) for _ in range(n)]

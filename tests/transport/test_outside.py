@@ -1,4 +1,4 @@
-"""What lies before the windows is seen as the sky lights it, and rooms have its light."""
+"""Outdoor objects are visible, lit by the sky, and light the rooms."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ BOARD = ((0.6 + 0.055) / 1.055) ** 2.4  # albedo of home()'s board
 
 
 def home(*, outside: str = "") -> tuple[House, Camera]:
-    """A grey wall with a hole, a floor before it; outside: the name of a board's material behind it."""
+    """A grey wall with a hole, and a floor in front; outside: material name of a board behind it."""
     wall = [
         rooms.quad([(-4, 0, 0), (-1, 0, 0), (-1, 3, 0), (-4, 3, 0)], 0),
         rooms.quad([(1, 0, 0), (4, 0, 0), (4, 3, 0), (1, 3, 0)], 0),
@@ -53,7 +53,7 @@ def light_of(outside: str) -> LightResult:
 
 
 def lit_board(camera: Camera, albedo: float, sky: tuple[float, float, float]) -> F64:
-    """(H, W, 3) radiance of home()'s board: under an even sky as bright as that times its colour; haze has the sky's."""
+    """(H, W, 3) radiance of home()'s board: under an even sky its albedo times the sky; haze has the sky's radiance."""
     street = np.array(STREET_RGB) / (np.array(STREET_RGB) @ LUMINANCE) * STREET_LX / 179 / np.pi
     _eyes, ways = camera.rays()
     away = 8.0 / np.abs(ways / np.linalg.norm(ways, axis=-1, keepdims=True))[..., 2:]
@@ -63,12 +63,12 @@ def lit_board(camera: Camera, albedo: float, sky: tuple[float, float, float]) ->
 
 def test_a_board_outside_has_the_skys_radiance_times_its_colour_and_fades_with_distance() -> None:
     plain, boarded = light_of(""), light_of("board")
-    seen = (plain.outdoor == np.array(SKY, np.float32)).all(-1)  # pixels of the hole alone
-    assert 0.05 < seen.mean() < 0.5
+    hole = (plain.outdoor == np.array(SKY, np.float32)).all(-1)  # pixels of the hole only
+    assert 0.05 < hole.mean() < 0.5
     expected = lit_board(home()[1], BOARD, SKY)
-    np.testing.assert_allclose(boarded.outdoor[seen], expected[seen], rtol=3e-3)
-    # The denoiser is told its colour.
-    np.testing.assert_allclose(boarded.albedo[seen], BOARD, rtol=2e-3)
+    np.testing.assert_allclose(boarded.outdoor[hole], expected[hole], rtol=3e-3)
+    # The denoiser gets its colour as guide.
+    np.testing.assert_allclose(boarded.albedo[hole], BOARD, rtol=2e-3)
 
 
 def test_a_gloss_outside_mirrors_the_sky() -> None:
@@ -80,7 +80,7 @@ def test_a_gloss_outside_mirrors_the_sky() -> None:
         LightScene.load(h, {}, RECIPE, uniform_sky(SKY)).render(camera, "0_0", fields, 1).outdoor
         for h in (house, polished)
     )
-    # A ray down to the board is mirrored down: what stands in a street has less light than the sky.
+    # A downward ray is mirrored down by the board: a street is darker than the sky.
     _eyes, ways = camera.rays()
     ways = ways / np.linalg.norm(ways, axis=-1, keepdims=True)
     t = 1 - np.abs(ways[..., 2:])
@@ -94,7 +94,7 @@ def test_a_gloss_outside_mirrors_the_sky() -> None:
 
 
 def enclosed(board: str, sky: Sky) -> tuple[float, float]:
-    """Mean radiance of a room whose window looks on a board that fills its view, and on the sky alone."""
+    """Mean radiance of a room whose window is filled by a board, and by the sky."""
     bare, _camera = rooms.window_room(0.5)
     camera = rooms.camera((2.0, 1.5, 1.0), (2.0, 0.5, 3.9))
     x0, x1, y0, y1, z = -400.0, 400.0, -400.0, 400.0, -3.0
@@ -110,17 +110,17 @@ def enclosed(board: str, sky: Sky) -> tuple[float, float]:
     return with_board, open_sky
 
 
-def test_a_room_has_the_light_of_what_its_window_shows() -> None:
+def test_a_room_is_lit_by_its_view_outside() -> None:
     with_board, open_sky = enclosed("board", uniform_sky((1.0, 1.0, 1.0)))
-    # The board is seen at three metres, by grazing rays farther: haze adds a little.
+    # The board is three metres away, farther for grazing rays: haze adds a little.
     assert BOARD * 0.98 < with_board / open_sky < BOARD * 1.15
 
 
-def test_what_stands_before_the_sun_takes_its_light() -> None:
+def test_an_object_before_the_sun_shades_it() -> None:
     sun = np.array([0.0, 0.4, -1.0]) / np.hypot(0.4, 1.0)  # into the window
     sky = replace(uniform_sky((0.0, 0.0, 0.0)), sun_direction=sun, sun_irradiance=np.full(3, 100.0))
     with_board, open_sky = enclosed("board", sky)
-    # What is left are street lamps, which the sky's own light hides by day.
+    # Only street lamps remain, which the sky hides by day.
     street = STREET_LX / 179 * BOARD
     assert open_sky > 0.5
     assert with_board < street
@@ -142,11 +142,12 @@ def test_leaves_outside_are_seen_through_between_them() -> None:
     tree = Item("outside_tree", "", ItemKind.PLANT, "0", sheets, tags=(OUTSIDE,))
     green = replace(house, items=(*house.items, tree), materials=(*house.materials, leaf))
     scene = LightScene.load(green, {"leaf": alpha}, RECIPE, uniform_sky(SKY))
-    found, boarded = scene.render(camera, "0_0", FIELDS, 1), light_of("board")
-    seen = (light_of("").outdoor == np.array(SKY, np.float32)).all(-1)
-    left = seen & (np.arange(32) < 14)
-    right = seen & (np.arange(32) >= 18)
-    assert min(left.sum(), right.sum()) > 10
-    # The left half of every sheet is a hole: the board is there behind all 24, and no shadow of them.
-    np.testing.assert_allclose(found.outdoor[left], boarded.outdoor[left], rtol=1e-4)
-    assert (found.outdoor[right] < 0.01 * np.array(SKY)).all()  # leaves are black but for haze
+    leafy, boarded = scene.render(camera, "0_0", FIELDS, 1), light_of("board")
+    hole = (light_of("").outdoor == np.array(SKY, np.float32)).all(-1)
+    left_half = hole & (np.arange(32) < 14)
+    right = hole & (np.arange(32) >= 18)
+    assert min(left_half.sum(), right.sum()) > 10
+    # The left half of every sheet is a hole: the board is visible behind all 24, without their
+    # shadow.
+    np.testing.assert_allclose(leafy.outdoor[left_half], boarded.outdoor[left_half], rtol=1e-4)
+    assert (leafy.outdoor[right] < 0.01 * np.array(SKY)).all()  # leaves are black except for haze

@@ -1,4 +1,4 @@
-"""Panes mirror the room, for rays straight from the camera."""
+"""Panes mirror the room for camera rays."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ MANY: LightFields = FIELDS.model_copy(update={"spp": 4096})
 
 
 def fresnel(cos: float) -> float:
-    """Reflectance of both surfaces of glass of index 1.5, all inner reflections counted."""
+    """Reflectance of both surfaces of glass of index 1.5, with all inner reflections."""
     sin_t = np.sqrt(1 - cos * cos) / 1.5
     cos_t = np.sqrt(1 - sin_t**2)
     s = ((cos - 1.5 * cos_t) / (cos + 1.5 * cos_t)) ** 2
@@ -34,7 +34,7 @@ def fresnel(cos: float) -> float:
 
 
 def pane_before_black(*, n_panes: int = 1) -> House:
-    """Panes at z = 0 and behind, and a black board behind them; before them is the sky."""
+    """Panes from z = 0 on, a black board behind them, the sky in front."""
 
     def sheet(z: float, material: int):  # type: ignore[no-untyped-def]
         return rooms.quad([(-9, -9, z), (9, -9, z), (9, 9, z), (-9, 9, z)], material)
@@ -49,15 +49,15 @@ def test_a_pane_before_a_black_wall_mirrors_the_sky_by_fresnels_law(cos: float) 
     sin = float(np.sqrt(1 - cos * cos))
     camera = rooms.camera((2 * sin, 0.0, 2 * cos), (0, 0, 0), 4, 4, 0.01)
     scene = LightScene.load(pane_before_black(), {}, RECIPE, uniform_sky((1.0, 2.0, 3.0)))
-    # By day it is followed by chance.
-    found = scene.render(camera, "0_0", MANY, 1).outdoor.mean((0, 1))
-    np.testing.assert_allclose(found, fresnel(cos) * np.array([1.0, 2.0, 3.0]), rtol=0.03)
+    # By day reflection is sampled at random.
+    mean = scene.render(camera, "0_0", MANY, 1).outdoor.mean((0, 1))
+    np.testing.assert_allclose(mean, fresnel(cos) * np.array([1.0, 2.0, 3.0]), rtol=0.03)
 
 
 @pytest.mark.quick(3)
 @pytest.mark.parametrize("n_faces", [1, 2, 4])
 @pytest.mark.parametrize(("has_board", "expected"), [(True, fresnel(1.0)), (False, 1.0)])
-def test_a_thing_of_glass_mirrors_by_its_first_face_and_without_noise(
+def test_a_glass_item_mirrors_by_its_first_face_without_noise(
     n_faces: int, has_board: bool, expected: float
 ) -> None:
     def sheet(z: float, material: int, *, x: float = 0.0, half: float = 9.0):  # type: ignore[no-untyped-def]
@@ -71,8 +71,8 @@ def test_a_thing_of_glass_mirrors_by_its_first_face_and_without_noise(
     home = rooms.house(surfaces, [rooms.matte("black", 0.0), pane, clear])
     camera = rooms.camera((0, 0, 2), (0, 0, 0), 8, 8, 0.01)
     scene = LightScene.load(home, {}, RECIPE, uniform_sky((1.0, 1.0, 1.0)))
-    found = scene.render(camera, "0_0", FIELDS, 1).outdoor
-    np.testing.assert_allclose(found, expected, rtol=0.01)
+    picture = scene.render(camera, "0_0", FIELDS, 1).outdoor
+    np.testing.assert_allclose(picture, expected, rtol=0.01)
 
 
 def test_glass_behind_the_holes_of_a_leaf_mirrors_as_glass_before_them() -> None:
@@ -91,15 +91,15 @@ def test_glass_behind_the_holes_of_a_leaf_mirrors_as_glass_before_them() -> None
     scene = LightScene.load(
         rooms.house(surfaces, materials), {}, RECIPE, uniform_sky((1.0, 1.0, 1.0))
     )
-    found = scene.render(camera, "0_0", FIELDS, 1).outdoor
-    np.testing.assert_allclose(found, fresnel(1.0), rtol=0.01)
+    picture = scene.render(camera, "0_0", FIELDS, 1).outdoor
+    np.testing.assert_allclose(picture, fresnel(1.0), rtol=0.01)
 
 
 def test_only_the_first_of_two_panes_mirrors() -> None:
     camera = rooms.camera((0, 0, 2), (0, 0, 0), 4, 4, 0.01)
     scene = LightScene.load(pane_before_black(n_panes=2), {}, RECIPE, uniform_sky((1.0, 1.0, 1.0)))
-    found = scene.render(camera, "0_0", MANY, 1).outdoor.mean()
-    assert found == pytest.approx(fresnel(1.0), rel=0.03)
+    mean = scene.render(camera, "0_0", MANY, 1).outdoor.mean()
+    assert mean == pytest.approx(fresnel(1.0), rel=0.03)
 
 
 @pytest.mark.parametrize("name", ["released", "fast"])
@@ -107,8 +107,8 @@ def test_at_night_a_window_shows_the_room_but_in_released(name: str) -> None:
     house, _camera = rooms.window_room(0.7, lumen=800, pane=True)
     camera = rooms.camera((2.0, 1.5, 3.0), (2.0, 1.5, 0.0), 8, 8, 0.2)
     recipe = recipe_from_name(name)
-    found = LightScene.load(house, {}, recipe, dark_sky()).render(camera, "0_0", FIELDS, 1)
-    assert bool(found.indoor.min() > 0) == (name == "fast")
+    result = LightScene.load(house, {}, recipe, dark_sky()).render(camera, "0_0", FIELDS, 1)
+    assert bool(result.indoor.min() > 0) == (name == "fast")
 
 
 @pytest.mark.long

@@ -1,4 +1,4 @@
-"""Path tracing: closed forms, exact facts, and Mitsuba's own integrator as a second opinion."""
+"""Path tracing: closed forms, exact facts, and comparison with Mitsuba's integrator."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_a_bulb_lights_a_floor_by_its_flux_and_the_cube_of_the_cosine(x: float) 
 
 
 def test_a_bulb_a_hand_from_the_ceiling_does_not_shadow_itself() -> None:
-    # The shadow ray's start moves off its surface; it must still end before the bulb.
+    # The shadow ray starts off its surface; it must still end before the bulb.
     ceiling = rooms.quad([(-9, 1, -9), (-9, 1, 9), (9, 1, 9), (9, 1, -9)], 0)
     bulb = rooms.bulb((0, 0.7, 0), 1, 1000.0)
     house = rooms.house([ceiling], [rooms.matte("ceiling", 0.5), rooms.BULB], lamps=[bulb])
@@ -120,35 +120,35 @@ def test_twice_the_emitters_give_twice_the_radiance() -> None:
     np.testing.assert_allclose(b.indoor, 2 * a.indoor, rtol=1e-5)
 
 
-def test_each_group_holds_its_own_light_alone() -> None:
+def test_each_group_holds_only_its_light() -> None:
     house, camera = rooms.window_room(lumen=800)
-    both = rendered(house, camera, uniform_sky((1, 1, 1)), spp=8)
+    together = rendered(house, camera, uniform_sky((1, 1, 1)), spp=8)
     lamps = rendered(house, camera, dark_sky(), spp=8)
     dark, _camera = rooms.window_room()
     day = rendered(dark, camera, uniform_sky((1, 1, 1)), spp=8)
     assert not lamps.outdoor.any()
     assert not day.indoor.any()
-    # The bulb's body stops a little daylight, so only the lamps' group is the same bits.
-    np.testing.assert_array_equal(lamps.indoor, both.indoor)
+    # The bulb's body blocks some daylight, so only the lamps' group has equal bits.
+    np.testing.assert_array_equal(lamps.indoor, together.indoor)
 
 
 @pytest.mark.parametrize("group", list(Group))
-def test_pictures_agree_with_mitsubas_own_path_integrator(group: Group) -> None:
+def test_pictures_agree_with_mitsubas_path_integrator(group: Group) -> None:
     # Significance: 16 blocks, |z| < 4.5 each is missed by chance once in 9000 runs.
     house, camera = rooms.window_room(0.6, lumen=800)
     sky = sunsky(RECIPE, elevation_rad=0.7, azimuth_rad=2.0)
     scene = LightScene.load(house, {}, RECIPE, replace(sky, sun_irradiance=np.zeros(3)))
-    other = ScalarScene(scene.tables, scene.sky, scene.variant)
+    scalar = ScalarScene(scene.tables, scene.sky, scene.variant)
     fields = FIELDS.model_copy(update={"spp": 128, "pilot_spp": 4})
     ours = [blocks(scene.render(camera, "0_0", fields, k).group(group)) for k in range(4)]
-    theirs = [blocks(other.render(camera, group, fields, 100 + k)) for k in range(4)]
+    theirs = [blocks(scalar.render(camera, group, fields, 100 + k)) for k in range(4)]
     assert np.abs(z_scores(ours, theirs)).max() < 4.5
     assert np.mean(ours) == pytest.approx(np.mean(theirs), rel=0.03)
 
 
-def test_weights_of_the_pilot_leave_the_mean_alone_and_cut_the_noise() -> None:
-    # Twelve lamps close behind a wall and one in the room: of those chosen without the pilot, by
-    # place or not, most shadow rays end at the wall.
+def test_weights_of_the_pilot_keep_the_mean_and_reduce_the_noise() -> None:
+    # Twelve lamps close behind a wall and one in the room: without the pilot, by place or not, most
+    # shadow rays end at the wall.
     house, camera = rooms.window_room(lumen=800)
     far = [rooms.bulb((0.9 + 0.2 * k, 2.2, 4.3), 1, 800.0) for k in range(12)]
     house = house.with_items([*house.items, *far])
@@ -161,11 +161,11 @@ def test_weights_of_the_pilot_leave_the_mean_alone_and_cut_the_noise() -> None:
         means[pilot_spp] = [blocks(r.indoor) for r in results]
         noise[pilot_spp] = float(np.mean([r.noise["indoor"] for r in results]))
     assert np.abs(z_scores(means[0], means[4])).max() < 4.5
-    # Half the variance: lamps by place had their part of the gain already.
+    # Half the variance: choosing lamps by place already reduced it.
     assert noise[4] ** 2 < 0.6 * noise[0] ** 2
 
 
-def test_thin_glass_dims_a_bulb_by_what_it_reflects_and_no_more() -> None:
+def test_thin_glass_dims_a_bulb_by_its_reflectance() -> None:
     glass = Material("glass", kind=MaterialKind.GLASS, opacity=0.1)
     floor = rooms.quad([(-9, 0, -9), (-9, 0, 9), (9, 0, 9), (9, 0, -9)], 0)
     sheet = rooms.quad([(-9, 0.5, -9), (-9, 0.5, 9), (9, 0.5, 9), (9, 0.5, -9)], 2)
@@ -196,13 +196,13 @@ def test_a_cut_out_leaf_lets_light_through_its_holes() -> None:
     materials = [rooms.matte("floor", 0.5), rooms.BULB, leaf]
     house = rooms.house([floor, sheet], materials, lamps=[rooms.bulb((0, 2, 0), 1, 1000.0)])
     scene = LightScene.load(house, {"leaf": half}, RECIPE, dark_sky())
-    seen = {}
+    lit = {}
     for x in (-0.8, 0.8):
         camera = rooms.camera((x, 0.3, 0.1), (x, 0, 0), 4, 4, 0.01)
         fields = FIELDS.model_copy(update={"spp": 64, "max_depth": 2})
-        seen[x] = float(scene.render(camera, "0_0", fields, 1).indoor.mean())
-    assert seen[0.8] == 0
-    assert seen[-0.8] > 1e-3
+        lit[x] = float(scene.render(camera, "0_0", fields, 1).indoor.mean())
+    assert lit[0.8] == 0
+    assert lit[-0.8] > 1e-3
 
 
 def leaf_room(leaf: Material) -> House:
@@ -216,7 +216,7 @@ def leaf_room(leaf: Material) -> House:
     ("cutoff", "alpha", "is_lit"),
     [(0.2, 90, False), (0.5, 90, True), (0.9, 200, True), (NOTHING_LEFT, None, True)],
 )
-def test_light_passes_where_alpha_is_below_the_cutoff(
+def test_light_passes_through_alpha_below_the_cutoff(
     cutoff: float, alpha: int | None, is_lit: bool
 ) -> None:
     textures = {} if alpha is None else {"leaf": np.full((8, 8, 4), alpha, np.uint8)}
@@ -244,10 +244,10 @@ def test_light_and_labels_cut_the_same_holes() -> None:
     from pbrs_farm.transport.kernels.surface_textures import is_hole_at
 
     slot = dr.gather(mi.Vector4f, mi.Float(rows[2]), mi.UInt32(FIRST_TEXEL // 4))
-    found = is_hole_at(mi.UInt32(atlas.texels), slot, mi.Point2f(uv.T), mi.Bool(True)).numpy()
+    is_hole = is_hole_at(mi.UInt32(atlas.texels), slot, mi.Point2f(uv.T), mi.Bool(True)).numpy()
     expected = CutOut(picture[..., 3:], 0.37).is_hole(uv)
     assert 0.1 < expected.mean() < 0.5
-    assert (found == expected).mean() > 0.9995
+    assert (is_hole == expected).mean() > 0.9995
 
 
 def test_another_camera_compiles_nothing() -> None:
@@ -256,10 +256,10 @@ def test_another_camera_compiles_nothing() -> None:
     house, camera = rooms.window_room(lumen=800)
     scene = LightScene.load(house, {}, RECIPE, uniform_sky((1, 1, 1)))
     scene.render(camera, "0_0", RECIPE.light, 1)
-    other = rooms.camera((2.0, 1.2, 3.0), (1.0, 0.5, 0.5))
+    second_camera = rooms.camera((2.0, 1.2, 3.0), (1.0, 0.5, 0.5))
     with dr.scoped_set_flag(dr.JitFlag.KernelHistory, True):
         dr.kernel_history_clear()
-        scene.render(other, "0_0", RECIPE.light, 2)
+        scene.render(second_camera, "0_0", RECIPE.light, 2)
         kernels = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
     assert kernels
     assert all(k["cache_hit"] for k in kernels)
@@ -287,7 +287,7 @@ def test_a_time_budget_takes_the_samples_that_fit_and_at_least_some() -> None:
     more = scene.render(camera, "0_0", fields.model_copy(update={"time_budget_s": 0.3}), 1)
     assert few.spp == 4
     assert 4 < more.spp < 100_000
-    # As many samples without a clock are the same bits.
+    # The same number of samples without a clock gives the same bits.
     same = scene.render(camera, "0_0", fields.model_copy(update={"spp": few.spp}), 1)
     np.testing.assert_array_equal(few.indoor, same.indoor)
     capped = fields.model_copy(update={"time_budget_s": 60.0, "max_spp": 8})
@@ -306,7 +306,7 @@ def test_a_noise_ends_a_time_budget_early() -> None:
 
 @pytest.mark.parametrize(("texel", "most"), [(225, 0.9), (255, 0.9), (255, 1.0)])
 def test_a_textured_floor_is_lit_by_the_albedo_of_its_label(texel: int, most: float) -> None:
-    # Kd times the texture is held to the limit, not Kd before it.
+    # Kd times the texture is limited, rather than Kd alone.
     recipe = recipe_from_name("released") if most == 1.0 else RECIPE
     floor = rooms.quad([(-50, 0, -50), (-50, 0, 50), (50, 0, 50), (50, 0, -50)], 0)
     house = rooms.house([floor], [Material("floor", diffuse=(1, 1, 1), texture_id="t")])
@@ -317,6 +317,6 @@ def test_a_textured_floor_is_lit_by_the_albedo_of_its_label(texel: int, most: fl
     geometry = geometry_from_house(house)
     hit = Caster(geometry).hit_record(camera)
     label = albedo_label(hit, house, geometry, {"t": pixels}, most)[14:]
-    told = linear_from_srgb(label / 255.0)
-    np.testing.assert_allclose(result.albedo[14:], told, atol=1 / 255)
-    np.testing.assert_allclose(result.outdoor[14:].mean((0, 1)), told.mean((0, 1)), rtol=4e-3)
+    linear = linear_from_srgb(label / 255.0)
+    np.testing.assert_allclose(result.albedo[14:], linear, atol=1 / 255)
+    np.testing.assert_allclose(result.outdoor[14:].mean((0, 1)), linear.mean((0, 1)), rtol=4e-3)

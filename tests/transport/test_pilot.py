@@ -1,4 +1,4 @@
-"""The pilot of very many lamps: what it leaves to those it found, and how small it gets; what a trial chooses."""
+"""The pilot with many lamps: weights of found lamps, its smallest size, and the choice by a trial."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ if choose_variant().startswith("scalar"):
     pytest.skip("the kernels need LLVM or CUDA", allow_module_level=True)
 
 
-def test_the_least_weights_of_many_lamps_leave_half_to_what_the_pilot_found() -> None:
+def test_the_least_weights_of_many_lamps_leave_half_to_those_of_the_pilot() -> None:
     from pbrs_farm.transport.pilot import LAMP_FLOOR, lamp_floors
 
     assert lamp_floors(500).sum() == pytest.approx(0.5)

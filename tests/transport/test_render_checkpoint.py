@@ -1,4 +1,4 @@
-"""A render that is killed and goes on makes the picture of one that was left alone."""
+"""A killed and resumed render makes the picture of an uninterrupted one."""
 
 from __future__ import annotations
 
@@ -36,11 +36,11 @@ METROPOLIS: LightFields = FIELDS.model_copy(
 
 
 class Killed(Exception):
-    """The process is gone."""
+    """Simulates the end of the process."""
 
 
 class Memory:
-    """Keeps every state; dies after n of them."""
+    """Stores every state; raises Killed after n of them."""
 
     spent_s = 0.0
 
@@ -63,7 +63,7 @@ class Memory:
 @lru_cache(maxsize=2)
 def scene_and_camera(*, is_sunny: bool) -> tuple[LightScene, Camera]:
     house, camera = rooms.window_room(lumen=800)
-    # A sun before the window, so that each launch has sunlit points of its own.
+    # The sun is in front of the window, so that each launch has different sunlit points.
     sun = sunsky(RECIPE, elevation_rad=0.5, azimuth_rad=0.35)
     scene = LightScene.load(house, {}, RECIPE, sun if is_sunny else uniform_sky((1, 1, 1)))
     return scene, camera.with_size(32, 24)
@@ -74,8 +74,8 @@ def rendered(fields: LightFields, checkpoint: Memory, *, is_sunny: bool = False)
     return scene.render(camera, "0_0", fields, 7, checkpoint)
 
 
-def gone_on(fields: LightFields, n: int, *, is_sunny: bool = False) -> LightResult:
-    """The picture of a render that was killed after it had kept n states."""
+def resumed(fields: LightFields, n: int, *, is_sunny: bool = False) -> LightResult:
+    """The picture of a render killed after storing n states and resumed."""
     killed = Memory(n)
     with pytest.raises(Killed):
         rendered(fields, killed, is_sunny=is_sunny)
@@ -96,10 +96,12 @@ def _short_launches(monkeypatch: pytest.MonkeyPatch) -> None:
     [{"spp": 14}, {"spp": 4, "noise": 0.12, "max_spp": 256}, {"spp": 8, "groups": "lamps"}],
 )
 @pytest.mark.parametrize("is_sunny", [False, True])
-def test_path_goes_on_to_the_same_bits(changes: dict[str, object], is_sunny: bool) -> None:
+def test_a_resumed_path_render_has_the_same_bits(
+    changes: dict[str, object], is_sunny: bool
+) -> None:
     fields = FIELDS.model_copy(update=changes)
     whole = rendered(fields, Memory(), is_sunny=is_sunny)
-    again = gone_on(fields, 1, is_sunny=is_sunny)
+    again = resumed(fields, 1, is_sunny=is_sunny)
     assert again.spp == whole.spp > 4
     assert again.noise == whole.noise
     for name in ("outdoor", "indoor", "albedo", "normal"):
@@ -110,8 +112,8 @@ def test_path_goes_on_to_the_same_bits(changes: dict[str, object], is_sunny: boo
 @pytest.mark.quick(1)
 @pytest.mark.usefixtures("_short_launches")
 @pytest.mark.parametrize("n", [1, 3, 5])  # in direct light, among the chains' first prefixes, later
-def test_metropolis_goes_on_to_the_same_picture(n: int) -> None:
-    whole, again = rendered(METROPOLIS, Memory()), gone_on(METROPOLIS, n)
+def test_a_resumed_metropolis_render_has_the_same_picture(n: int) -> None:
+    whole, again = rendered(METROPOLIS, Memory()), resumed(METROPOLIS, n)
     assert again.facts["indoor"]["mutations"] == whole.facts["indoor"]["mutations"]
     for name in ("outdoor", "indoor"):
         a, b = getattr(again, name), getattr(whole, name)
@@ -120,7 +122,7 @@ def test_metropolis_goes_on_to_the_same_picture(n: int) -> None:
 
 
 @pytest.mark.usefixtures("_short_launches")
-def test_the_share_that_is_done_grows_to_one() -> None:
+def test_the_finished_share_grows_to_one() -> None:
     memory = Memory()
     rendered(METROPOLIS, memory)
     assert memory.shares == sorted(memory.shares)
@@ -132,7 +134,7 @@ def test_the_share_that_is_done_grows_to_one() -> None:
 def test_metropolis_leaves_out_mutations_once_the_noise_is_reached() -> None:
     long = METROPOLIS.model_copy(update={"mutations_per_pixel": 1024, "noise": 0.1})
     result = rendered(long, Memory())
-    made = result.facts["indoor"]["mutations"]
+    n_made = result.facts["indoor"]["mutations"]
     assert result.noise["sum"] <= 0.1
-    assert 0 < made < 1024 * PIXELS / 2
-    assert made == result.facts["outdoor"]["mutations"]
+    assert 0 < n_made < 1024 * PIXELS / 2
+    assert n_made == result.facts["outdoor"]["mutations"]

@@ -1,4 +1,4 @@
-"""Hit records written by hand, and a small house to go with them."""
+"""Hand-written hit records, and a matching small house."""
 
 import numpy as np
 
@@ -8,7 +8,7 @@ from pbrs_farm.core.house import House, Item, ItemKind, Level, Material, Source,
 
 
 def camera(width: int = 8, height: int = 6) -> Camera:
-    """At the origin, looking along -z, 90 degrees wide."""
+    """A camera at the origin, looking along -z, 90 degrees wide."""
     intrinsics = Intrinsics.from_hfov(width, height, np.pi / 2)
     return Camera.look(intrinsics, np.zeros(3), np.array([0.0, 0.0, -1.0]))
 
@@ -16,12 +16,12 @@ def camera(width: int = 8, height: int = 6) -> Camera:
 def hit(item: object, depth_z: object, normal: object = (0.0, 0.0, 1.0)) -> HitRecord:
     """A hit record from ids (H, W), depths (or one depth) and normals (or one normal)."""
     items = np.array(item, np.uint32)
-    there = items > 0
-    depths = np.where(there, np.broadcast_to(np.array(depth_z, np.float32), items.shape), 0)
+    valid = items > 0
+    depths = np.where(valid, np.broadcast_to(np.array(depth_z, np.float32), items.shape), 0)
     normals = np.broadcast_to(np.array(normal, np.float32), (*items.shape, 3))
-    normals = np.where(there[..., None], normals, 0).astype(np.float32)
+    normals = np.where(valid[..., None], normals, 0).astype(np.float32)
     zeros = np.zeros((*items.shape, 3), np.float32)
-    face = np.where(there, items.astype(np.int32) - 1, -1).astype(np.int32)
+    face = np.where(valid, items.astype(np.int32) - 1, -1).astype(np.int32)
     points = SurfacePoints(zeros, normals, zeros[..., :2].copy())
     return HitRecord(face, items, depths.astype(np.float32), normals, lambda: points)
 

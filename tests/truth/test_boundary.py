@@ -7,7 +7,7 @@ from pbrs_farm.truth.boundary import instance_boundary
 
 
 def by_the_text(ids: np.ndarray) -> np.ndarray:
-    """The published definition, pixel by pixel."""
+    """Boundaries by the published definition, pixel by pixel."""
     height, width = ids.shape
     out = np.zeros(ids.shape, np.uint8)
     for r in range(height):

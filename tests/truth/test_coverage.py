@@ -12,7 +12,7 @@ from tests.truth.hits import camera, house
 
 
 def by_rays(points: np.ndarray, faces: np.ndarray, view: Camera) -> np.ndarray:
-    """Every ray against every triangle."""
+    """Coverage by testing every ray against every triangle."""
     origin, directions = view.rays()
     origin, d = origin.astype(float), directions.reshape(-1, 3).astype(float)
     hit = np.zeros(len(d), bool)
@@ -29,7 +29,7 @@ def by_rays(points: np.ndarray, faces: np.ndarray, view: Camera) -> np.ndarray:
 
 
 @pytest.mark.parametrize("seed", range(8))
-def test_coverage_is_what_rays_hit_near_far_and_across_the_eye(seed):
+def test_coverage_equals_ray_hits_near_far_and_across_the_eye(seed):
     rng = np.random.default_rng(seed)
     points = rng.normal(0, 2, (30, 3)).astype(np.float32)
     faces = rng.integers(0, 30, (6, 3)).astype(np.int32)
@@ -65,7 +65,7 @@ def test_a_triangle_with_nan_is_left_out():
 
 
 def leaf(cutoff: float = 0.5) -> tuple[Item, dict[int, CutOut]]:
-    """A slanted square before the camera, the left half of its picture a hole."""
+    """A slanted square before the camera whose left half is a hole in its picture."""
     points = np.array([[-1, -1, -2], [1, -1, -3], [1, 1, -3], [-1, 1, -2]], np.float32)
     uvs = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float32)
     surface = Surface("s", points, np.array([[0, 1, 2], [0, 2, 3]], np.int32), 3, uvs)
@@ -77,18 +77,19 @@ def leaf(cutoff: float = 0.5) -> tuple[Item, dict[int, CutOut]]:
 def test_an_item_covers_nothing_in_its_holes():
     view = Camera.look(Intrinsics.from_hfov(160, 120), np.zeros(3), np.array([0, 0, -1.0]))
     item, holes = leaf()
-    whole, left = truth.coverage(item, view), truth.coverage(item, view, holes)
-    # The square's left half is the hole, but for half a texel at the edge: the picture repeats.
+    whole, visible = truth.coverage(item, view), truth.coverage(item, view, holes)
+    # The left half of the square is the hole, except for half a texel at the edge, because the
+    # picture repeats.
     edge = int(np.flatnonzero(whole.any(0))[0])
     assert edge < 20
-    assert not left[:, edge + 8 : 79].any()
-    assert np.array_equal(left[:, 82:140], whole[:, 82:140])
+    assert not visible[:, edge + 8 : 79].any()
+    assert np.array_equal(visible[:, 82:140], whole[:, 82:140])
     assert np.array_equal(truth.coverage(item, view, leaf(0.2)[1]), whole)
     assert not truth.coverage(item, view, leaf(0.9)[1]).any()
     assert np.array_equal(truth.coverage(item, view, {7: holes[3]}), whole)
 
 
-def test_an_item_alone_covers_what_the_rays_to_it_meet():
+def test_coverage_of_a_single_item_equals_the_hits_of_its_rays():
     view = Camera.look(Intrinsics.from_hfov(160, 120), np.zeros(3), np.array([0.1, 0.05, -1.0]))
     item, holes = leaf()
     home = replace(house(), items=(item,), materials=(Material("m"),) * 4)

@@ -13,7 +13,7 @@ def camera() -> Camera:
     return Camera.look(intrinsics, np.array([0, 1.25, 0.0]), np.array([0, 0, -1.0]))
 
 
-def test_corners_project_to_their_pixels_and_those_behind_to_none():
+def test_corners_project_to_their_pixels_and_those_behind_the_eye_to_none():
     rows = truth.layout_table(ROOM, camera(), np.full((60, 80), 10.0, np.float32))
     assert [(r["corner"], r["at"]) for r in rows[:2]] == [(0, "floor"), (1, "floor")]
     assert len(rows) == 8
@@ -24,7 +24,7 @@ def test_corners_project_to_their_pixels_and_those_behind_to_none():
     assert not rows[2]["visible"]
 
 
-def test_a_corner_is_visible_unless_something_stands_before_it():
+def test_a_corner_is_visible_unless_occluded():
     depth_z = np.full((60, 80), 4.0, np.float32)
     depth_z[:, 40:] = 2.0
     rows = truth.layout_table(ROOM, camera(), depth_z)

@@ -1,4 +1,4 @@
-"""What mirrors show, and gloss, in closed form."""
+"""Layers of mirrors and gloss in closed form."""
 
 from dataclasses import replace
 
@@ -14,7 +14,7 @@ MIRROR = Material("mirror", MaterialKind.MIRROR)
 
 
 def scene(*surfaces: Surface, materials: tuple[Material, ...]) -> House:
-    """A house of one item a surface, each of its own material."""
+    """A house with one item per surface, each with a separate material."""
     home = house(*range(1, len(surfaces) + 1))
     items = tuple(
         replace(item, surfaces=(replace(s, material=k),))
@@ -24,50 +24,50 @@ def scene(*surfaces: Surface, materials: tuple[Material, ...]) -> House:
 
 
 def turned(surface: Surface, degrees: float) -> Surface:
-    """About the vertical axis through (0, 0, -2)."""
+    """The surface turned about the vertical axis through (0, 0, -2)."""
     c, s = np.cos(np.radians(degrees)), np.sin(np.radians(degrees))
     turn = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]])
     points = (surface.positions - [0, 0, -2]) @ turn.T + [0, 0, -2]
     return replace(surface, positions=points.astype(np.float32))
 
 
-def made(home: House, *names: str) -> dict[str, np.ndarray]:
+def layers_of(home: House, *names: str) -> dict[str, np.ndarray]:
     return truth.optional_layers(names, label_inputs_of(home, camera()))
 
 
 def test_a_mirror_before_the_eye_shows_the_wall_behind_it_as_far_behind_the_mirror():
     home = scene(square(-2, 1), square(3, 40), materials=(MIRROR, Material("wall")))
-    found = made(
+    layers = layers_of(
         home, "mirror", *(f"behind_mirror_{n}" for n in ("depth", "normal", "semantic", "instance"))
     )
-    assert found["mirror"][3, 4] == 255
-    assert found["behind_mirror_depth"][3, 4] == 2000 + 5000
-    assert found["behind_mirror_instance"][3, 4] == found["behind_mirror_semantic"][3, 4] == 2
-    # The image of the wall faces the eye: published axes are x right, y forward, z up.
-    assert found["behind_mirror_normal"][3, 4].tolist() == [32768, 0, 32768]
+    assert layers["mirror"][3, 4] == 255
+    assert layers["behind_mirror_depth"][3, 4] == 2000 + 5000
+    assert layers["behind_mirror_instance"][3, 4] == layers["behind_mirror_semantic"][3, 4] == 2
+    # The mirrored wall faces the eye: published axes are x right, y forward, z up.
+    assert layers["behind_mirror_normal"][3, 4].tolist() == [32768, 0, 32768]
     # Beside the mirror nothing is hit.
-    assert found["mirror"][0, 0] == found["behind_mirror_depth"][0, 0] == 0
+    assert layers["mirror"][0, 0] == layers["behind_mirror_depth"][0, 0] == 0
 
 
 def test_a_slanting_mirror_shows_a_wall_at_the_side_turned_as_its_image():
-    wall = turned(square(-2 + 4, 40), 90)  # x = 4, across what comes from the mirror
+    wall = turned(square(-2 + 4, 40), 90)  # x = 4, across the reflected rays
     home = scene(turned(square(-2, 0.5), 45), wall, materials=(MIRROR, Material("wall")))
-    found = made(
+    layers = layers_of(
         home, "mirror", "behind_mirror_depth", "behind_mirror_normal", "behind_mirror_instance"
     )
-    where = found["mirror"] > 0
+    where = layers["mirror"] > 0
     assert where.any()
-    assert (found["behind_mirror_instance"][where] == 2).all()
-    # Its image is the plane z = -6, which faces the eye.
-    assert set(found["behind_mirror_depth"][where]) == {6000}
-    assert (np.abs(found["behind_mirror_normal"][where] - np.array([32768, 0, 32768])) <= 2).all()
+    assert (layers["behind_mirror_instance"][where] == 2).all()
+    # The mirrored wall is the plane z = -6, which faces the eye.
+    assert set(layers["behind_mirror_depth"][where]) == {6000}
+    assert (np.abs(layers["behind_mirror_normal"][where] - np.array([32768, 0, 32768])) <= 2).all()
 
 
 def test_mirrors_face_to_face_end_as_a_mirror_and_open_ones_show_nothing():
-    both = scene(square(-2, 40), square(3, 40), materials=(MIRROR, MIRROR))
-    assert made(both, "behind_mirror_instance")["behind_mirror_instance"][3, 4] in (1, 2)
+    facing = scene(square(-2, 40), square(3, 40), materials=(MIRROR, MIRROR))
+    assert layers_of(facing, "behind_mirror_instance")["behind_mirror_instance"][3, 4] in (1, 2)
     alone = scene(square(-2, 1), materials=(MIRROR,))
-    assert made(alone, "behind_mirror_instance")["behind_mirror_instance"][3, 4] == 0
+    assert layers_of(alone, "behind_mirror_instance")["behind_mirror_instance"][3, 4] == 0
 
 
 @pytest.mark.parametrize(
@@ -82,10 +82,10 @@ def test_mirrors_face_to_face_end_as_a_mirror_and_open_ones_show_nothing():
     ],
 )  # fmt: skip
 def test_gloss_is_that_of_the_material(material, roughness, f0, metallic):
-    found = made(scene(square(-2, 1), materials=(material,)), "roughness", "f0", "metallic")
-    assert found["roughness"][3, 4] == roughness
-    assert found["f0"][3, 4].tolist() == [f0] * 3
-    assert found["metallic"][3, 4] == metallic
+    layers = layers_of(scene(square(-2, 1), materials=(material,)), "roughness", "f0", "metallic")
+    assert layers["roughness"][3, 4] == roughness
+    assert layers["f0"][3, 4].tolist() == [f0] * 3
+    assert layers["metallic"][3, 4] == metallic
 
 
 def test_a_roughness_map_scales_the_roughness_by_its_green():

@@ -17,7 +17,7 @@ from tests.truth.hits import camera, hit, house, square
 
 
 def glazed() -> House:
-    """A pane at 2 m before a red wall at 3 m."""
+    """A pane at 2 m in front of a red wall at 3 m."""
     home = house(9, 1)
     items = tuple(
         replace(i, surfaces=(replace(square(z, half), material=k),), source_class=name)
@@ -29,7 +29,7 @@ def glazed() -> House:
     return replace(home, items=items, materials=materials)
 
 
-def test_the_table_of_layers_names_exactly_what_can_be_made():
+def test_the_table_of_layers_names_exactly_the_computable_ones():
     assert set(truth.OPTIONAL_NAMES) == {x.name for x in LAYERS if x.optional and x.step == "truth"}
 
 
@@ -45,7 +45,7 @@ def test_every_layer_has_the_shape_and_type_of_the_table():
         assert str(array.dtype) == LAYER[name].dtype, name
 
 
-def test_behind_glass_the_wall_is_seen_and_the_mask_says_where():
+def test_the_wall_behind_glass_is_labelled_and_the_mask_marks_it():
     layers = truth.optional_layers(truth.OPTIONAL_NAMES, label_inputs_of(glazed(), camera()))
     assert layers["glass"][3, 4] == 255
     assert layers["glass"][0, 0] == 0
@@ -123,7 +123,7 @@ def test_a_poster_on_a_wall_is_an_instance_boundary_and_no_occlusion():
 
 
 def room_corner(fall: float) -> HitRecord:
-    """A floor 1 m below, cut by a wall at 4 m that leans: fall 0 is upright."""
+    """A floor 1 m below, cut by a leaning wall at 4 m; fall 0 is upright."""
     view = camera(40, 30)
     _, rays = view.rays()
     with np.errstate(divide="ignore"):
@@ -203,7 +203,7 @@ def test_a_kinects_noise_is_patchy_over_its_block():
     def alike(px: int) -> float:
         return float(np.corrcoef(noise[:, px:].ravel(), noise[:, :-px].ravel())[0, 1])
 
-    # Blocks of 9 x 9 that are px apart share (9 - px) / 9 of their pixels.
+    # Two 9 x 9 blocks shifted by px share (9 - px) / 9 of their pixels.
     for px in (1, 3, 6):
         assert abs(alike(px) - (9 - px) / 9) < 0.08
     assert abs(alike(12)) < 0.08
@@ -218,7 +218,7 @@ def test_a_sensor_is_the_same_for_the_same_seed_and_blind_out_of_range():
     assert (same[0] != same[2]).any()
 
 
-def test_the_sensors_shadow_lies_left_of_what_is_near():
+def test_the_sensors_shadow_is_left_of_near_objects():
     depth_z = np.full((40, 320), 3.0)
     depth_z[:, 150:] = 1.0
     noisy = truth.sensor_depth(hit(np.ones((40, 320)), depth_z), camera(320, 40), seed=0)
@@ -230,14 +230,14 @@ def test_the_sensors_shadow_lies_left_of_what_is_near():
 
 
 def tilted_map(degrees: float, *, along_v: bool = False) -> np.ndarray:
-    """A normal map of one normal, turned by degrees from z towards u or v."""
+    """A normal map with one normal, turned by degrees from z towards u or v."""
     x, z = np.sin(np.radians(degrees)), np.cos(np.radians(degrees))
     normal = (0, x, z) if along_v else (x, 0, z)
     return np.full((4, 4, 3), np.round((np.array(normal) + 1) * 127.5), np.uint8)
 
 
 def decoded(picture: np.ndarray) -> np.ndarray:
-    """Published camera frame (x right, y forward, z up) of a stored normal, in OpenGL axes."""
+    """A stored normal (published camera frame: x right, y forward, z up) in OpenGL axes."""
     n = picture.astype(np.float64) * 2 / 65535 - 1
     return np.stack([n[..., 0], n[..., 2], -n[..., 1]], -1)
 
@@ -263,8 +263,8 @@ def test_the_shading_layer_shows_the_normal_map_and_no_other_layer_does(
         turn = -1 if back or (mirrored and not along_v) else 1
         expected = np.array([0, turn * 0.5, 0]) if along_v else np.array([turn * 0.5, 0, 0])
         expected[2] = np.cos(np.radians(30))
-        seen = decoded(layers["normal_shading"])[3, 4]
-        np.testing.assert_allclose(seen, expected, atol=0.006)
+        shown = decoded(layers["normal_shading"])[3, 4]
+        np.testing.assert_allclose(shown, expected, atol=0.006)
         flat = truth.optional_layers(("normal_world",), label_inputs_of(plain, camera()))
         np.testing.assert_array_equal(layers["normal_world"], flat["normal_world"])
 
@@ -283,11 +283,11 @@ def test_a_time_of_flight_camera_has_less_noise_than_a_kinect_and_mixes_at_edges
         for name, layer in (("kinect", truth.sensor_depth), ("tof", tof_depth))
     }
     assert 1 < errors["tof"] < errors["kinect"]
-    # A near card on the left: the pixels beside its edge lie between the two.
+    # A near card on the left: the pixels at its edge are between the two depths.
     depth_z = np.where(np.arange(80) < 40, 1.0, 3.0)[None, :].repeat(60, 0)
-    found = tof_depth(hit(np.ones((60, 80)), depth_z), camera(80, 60), seed=1)
-    assert ((found[:, 39:41] > 1050) & (found[:, 39:41] < 2950)).mean() > 0.9
-    assert ((found[:, 10:30] > 1050) & (found[:, 10:30] < 2950)).mean() == 0
+    depth = tof_depth(hit(np.ones((60, 80)), depth_z), camera(80, 60), seed=1)
+    assert ((depth[:, 39:41] > 1050) & (depth[:, 39:41] < 2950)).mean() > 0.9
+    assert ((depth[:, 10:30] > 1050) & (depth[:, 10:30] < 2950)).mean() == 0
     assert not tof_depth(hit(np.ones((6, 8)), 6.0), camera(), seed=1).any()
 
 
@@ -298,32 +298,32 @@ def test_a_stereo_cameras_noise_grows_with_the_square_of_distance_and_edges_have
     )
     assert 5 < (far - 3000.0).std() / (near - 1000.0).std() < 13
     assert near.all()
-    # What stands left of the near card's own left edge is hidden from the right camera.
+    # The area left of the near card's left edge is hidden from the right camera.
     depth_z = np.where((np.arange(320) >= 160) & (np.arange(320) < 200), 1.0, 3.0)
-    found = stereo_depth(
+    depth = stereo_depth(
         hit(np.ones((40, 320)), depth_z[None].repeat(40, 0)), camera(320, 40), seed=0
     )
-    assert (found[:, 155:159] == 0).mean() > 0.7
-    assert found[:, 210:].all()
+    assert (depth[:, 155:159] == 0).mean() > 0.7
+    assert depth[:, 210:].all()
     same = [stereo_depth(hit(np.ones((6, 8)), 2.0), camera(), seed=s) for s in (3, 3)]
     assert (same[0] == same[1]).all()
 
 
 def wall_errors(layer, z: float, **fields) -> np.ndarray:
-    """Of a wall z metres before the camera, away from the picture's edges: mm."""
-    found = layer(hit(np.ones((60, 320)), z), camera(320, 60), seed=2, **fields)[5:-5, 60:-5]
-    assert found.all()
-    return found - 1000.0 * z
+    """Errors in mm for a wall z metres away, excluding the picture's edges."""
+    measured = layer(hit(np.ones((60, 320)), z), camera(320, 60), seed=2, **fields)[5:-5, 60:-5]
+    assert measured.all()
+    return measured - 1000.0 * z
 
 
-def test_each_sensor_has_the_noise_that_its_sheet_says() -> None:
-    # Twice the baseline, so half the error of depth: it goes with focal length times baseline.
+def test_each_sensor_has_the_noise_of_its_data_sheet() -> None:
+    # Twice the baseline, so half the depth error, which is inverse to focal length times baseline.
     d435, d455 = (wall_errors(stereo_depth, 3.0, sensor=s).std() for s in (D435, D455))
     assert d455 / d435 == pytest.approx(447 * 0.05 / (455 * 0.095), rel=0.1)
     # A lidar camera: 2.5 mm at 1 m, 9 mm at 5 m, on the line to 15.5 mm at 9 m.
     for z, sigma in ((1.0, 2.5), (5.0, 9.0)):
         assert wall_errors(tof_depth, z, sensor=L515).std() == pytest.approx(sigma, rel=0.1)
-    # An Azure Kinect is no worse at 3.5 m than a Kinect 2 at 2.5 m, and reaches less far.
+    # An Azure Kinect at 3.5 m is no worse than a Kinect 2 at 2.5 m, and has a shorter range.
     azure, kinect2 = (wall_errors(tof_depth, 3.5, sensor=s).std() for s in (AZURE, KINECT2))
     assert azure == pytest.approx(wall_errors(tof_depth, 2.5).std(), rel=0.1)
     assert azure < 0.75 * kinect2
@@ -332,14 +332,14 @@ def test_each_sensor_has_the_noise_that_its_sheet_says() -> None:
 
 def test_an_azure_kinect_leaves_edges_out() -> None:
     depth_z = np.where(np.arange(80) < 40, 1.0, 3.0)[None, :].repeat(60, 0)
-    found = tof_depth(hit(np.ones((60, 80)), depth_z), camera(80, 60), seed=1, sensor=AZURE)
-    assert not found[:, 39:41].any()
-    assert found[:, :38].all()
-    assert found[:, 42:].all()
+    depth = tof_depth(hit(np.ones((60, 80)), depth_z), camera(80, 60), seed=1, sensor=AZURE)
+    assert not depth[:, 39:41].any()
+    assert depth[:, :38].all()
+    assert depth[:, 42:].all()
 
 
 def test_nocs_is_the_point_in_the_models_box_and_nothing_elsewhere() -> None:
-    # Two squares, the nearer one a model turned by 90 degrees about the axis of view and moved.
+    # Two squares, the nearer one a model turned by 90 degrees about the view axis and moved.
     home = house(5, 1)
     half, z = 0.5, -2.0
     pose = ModelPose("m", ((0, -1, 0, 0), (1, 0, 0, 0), (0, 0, 1, z), (0, 0, 0, 1)))
@@ -348,12 +348,12 @@ def test_nocs_is_the_point_in_the_models_box_and_nothing_elsewhere() -> None:
     inputs = label_inputs_of(home, camera(64, 64))
     label = truth.optional_layers(["nocs"], inputs)["nocs"]
     assert label.dtype == np.uint16
-    own = inputs.hit.item == 1
-    assert own.any()
-    assert not label[~own].any()
-    # The model's x is the world's y, its y the world's -x; the box is flat, its diagonal sqrt(2).
-    world = inputs.hit.points.position_world[own].astype(np.float64)
+    near_item = inputs.hit.item == 1
+    assert near_item.any()
+    assert not label[~near_item].any()
+    # The model's x is the world's y, its y the world's -x; the box is flat, with diagonal sqrt(2).
+    world = inputs.hit.points.position_world[near_item].astype(np.float64)
     model_xyz = np.stack([world[:, 1], -world[:, 0], np.zeros(len(world))], axis=1)
     expected = model_xyz / np.sqrt(2) + 0.5
-    assert np.abs(label[own] / 65535 - expected).max() < 1e-5
-    assert (label[own][:, 2] == 32768).all()
+    assert np.abs(label[near_item] / 65535 - expected).max() < 1e-5
+    assert (label[near_item][:, 2] == 32768).all()

@@ -1,4 +1,4 @@
-"""Points followed through a film of a wall and a square that moves before it: closed forms."""
+"""Points tracked through a film of a wall and a square that moves in front of it: closed forms."""
 
 from __future__ import annotations
 
@@ -6,9 +6,9 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.truth.point_tracks import MOST_POINTS, PointTracks, TrackFrame, point_tracks
-from tests.inputs.flow_squares import HEIGHT, WIDTH, F, at, squares
+from tests.inputs.flow_squares import HEIGHT, WIDTH, F, camera_at, squares
 
-SPEED = 0.5  # m/s to the right, of a square of 0.5 m at 2 m; the wall is at 4 m
+SPEED = 0.5  # m/s to the right, for a square of 0.5 m at 2 m; the wall is at 4 m
 TIMES = (0.0, 0.5, 1.0, 5.0)
 
 
@@ -21,7 +21,7 @@ def film() -> PointTracks:
         matrix[0, 3] = SPEED * (to_s - from_s)
         return np.array([0, 0, 1, 1]), np.stack([np.eye(4), matrix])
 
-    view = at(0)
+    view = camera_at(0)
     frames = [
         TrackFrame(view, t, lambda t=t: scene(t).hit_record(view), lambda t=t: scene(t).first_hit)
         for t in TIMES

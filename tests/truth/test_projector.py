@@ -13,7 +13,7 @@ from pbrs_farm.truth.projector import projector_label
 BASELINE_M = 0.1
 
 
-def seen(camera: Camera, partner: Camera | None, depth: float = 2.0, slab: bool = False):
+def dot_picture(camera: Camera, partner: Camera | None, depth: float = 2.0, slab: bool = False):
     wall = rooms.quad([(-9, -9, -depth), (9, -9, -depth), (9, 9, -depth), (-9, 9, -depth)], 0)
     parts = [wall]
     if slab:
@@ -28,39 +28,39 @@ def seen(camera: Camera, partner: Camera | None, depth: float = 2.0, slab: bool 
 
 
 def pair() -> tuple[Camera, Camera]:
-    left = rooms.camera((0, 0, 0), (0, 0, -1), 320, 240)
-    world = left.world_from_camera.copy()
+    left_camera = rooms.camera((0, 0, 0), (0, 0, -1), 320, 240)
+    world = left_camera.world_from_camera.copy()
     world[:3, 3] = [BASELINE_M, 0, 0]
-    return left, Camera(left.intrinsics, world)
+    return left_camera, Camera(left_camera.intrinsics, world)
 
 
 def test_both_pictures_of_a_pair_show_the_same_dots_on_the_same_points() -> None:
     left, right = pair()
     shift = round(left.intrinsics.fx * BASELINE_M / 2.0)
-    # A whole number of pixels of disparity, so that the pictures can be laid on one another.
+    # A whole number of pixels of disparity, so that the pictures can be overlaid.
     depth = left.intrinsics.fx * BASELINE_M / shift
-    (first, _), (second, _) = seen(left, right, depth), seen(right, left, depth)
+    (first, _), (second, _) = dot_picture(left, right, depth), dot_picture(right, left, depth)
     assert 0.05 < (first > 20).mean() < 0.6
-    there, here = second[:, : 320 - shift].astype(int), first[:, shift:].astype(int)
-    assert np.abs(there - here).max() <= 2
+    from_second, from_first = second[:, : 320 - shift].astype(int), first[:, shift:].astype(int)
+    assert np.abs(from_second - from_first).max() <= 2
 
 
-def test_what_the_projector_does_not_reach_is_dark_and_far_walls_are_darker() -> None:
+def test_surfaces_the_projector_misses_are_dark_and_far_walls_are_darker() -> None:
     camera = rooms.camera((0, 0, 0), (0, 0, -1), 320, 240)
-    lit, hit = seen(camera, None, slab=True)
-    free, _ = seen(camera, None)
-    # Beside the slab, on the side away from the projector, the wall lies in its shadow.
+    lit, hit = dot_picture(camera, None, slab=True)
+    free, _ = dot_picture(camera, None)
+    # Beside the slab, on the side away from the projector, the wall is in its shadow.
     behind = hit.depth_z > 1.5
     shadow = behind & (free > 20) & (lit == 0)
     columns = np.nonzero(shadow.any(0))[0]
     assert len(columns)
     assert columns.max() < 160
     assert (lit[lit > 0] == free[lit > 0])[behind[lit > 0]].all(), "what is lit is as without it"
-    far, _ = seen(camera, None, depth=6.0)
+    far, _ = dot_picture(camera, None, depth=6.0)
     assert 0 < far.max() < free.max()
 
 
-def test_nothing_is_lit_where_nothing_is_hit() -> None:
+def test_pixels_without_a_hit_are_unlit() -> None:
     camera = rooms.camera((0, 0, 0), (0, 0, 1), 32, 24)
-    picture, hit = seen(camera, None)
+    picture, hit = dot_picture(camera, None)
     assert not picture[~hit.valid].any()

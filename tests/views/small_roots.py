@@ -1,4 +1,4 @@
-"""Finished output roots of small views without rendering: one surface, colours by chance."""
+"""Finished output roots of small views without rendering: one surface, random colours."""
 
 from __future__ import annotations
 

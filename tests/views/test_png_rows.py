@@ -13,13 +13,13 @@ from pbrs_farm.views.png_rows import array_of_rows, png_of_rows
     params=["zlib", pytest.param("zlib_ng.zlib_ng", marks=pytest.mark.study)], autouse=True
 )
 def _inflating(request, monkeypatch):
-    """Every test of this file with either library, whichever is installed beside the other."""
+    """Run every test of this file with each installed library."""
     monkeypatch.setattr(png_rows, "inflating", import_module(request.param))
 
 
 @pytest.mark.parametrize("dtype", [np.uint8, np.uint16])
 @pytest.mark.parametrize("shape", [(5, 7), (5, 7, 3), (1, 1), (3, 1, 3), (70, 700, 3)])
-def test_what_is_written_is_read_by_us_and_by_libpng(dtype, shape):
+def test_libpng_and_we_read_our_pngs(dtype, shape):
     top = np.iinfo(dtype).max + 1
     array = np.random.default_rng(1).integers(0, top, shape).astype(dtype)
     png = png_of_rows(array)
@@ -43,7 +43,7 @@ def test_a_picture_filtered_otherwise_is_left_to_others():
     assert array_of_rows(png_from_array(colour), "x") is None
 
 
-def test_a_damaged_or_truncated_file_is_told():
+def test_a_damaged_or_truncated_file_is_refused():
     png = png_of_rows(np.arange(600, dtype=np.uint16).reshape(20, 30))
     for damaged in (png[:-20], png[:60], b"", b"\x89PNG\r\n\x1a\n", png[:45] + b"?" + png[46:]):
         with pytest.raises(BadInput, match="x: "):

@@ -42,7 +42,7 @@ def rays_of(k: np.ndarray, size: tuple[int, int]) -> np.ndarray:
 
 
 def slopes(sample: Sample) -> np.ndarray:
-    """Angle in degrees between the stored normals and those of the points that depth and K give."""
+    """Angle in degrees between the stored normals and those computed from depth and K."""
     points = rays_of(sample.K, sample.size) * sample.depth[..., None]
     n = np.cross(points[1:, :-1] - points[:-1, :-1], points[:-1, 1:] - points[:-1, :-1])
     n /= np.linalg.norm(n, axis=-1, keepdims=True)
@@ -77,11 +77,11 @@ def test_flipping_twice_gives_the_same_bits():
 @pytest.mark.parametrize("axes", AXES)
 def test_axes_are_right_handed_and_turn_back(axes):
     assert np.linalg.det(axes_from_axes(axes, "opencv")) == pytest.approx(1)
-    there = with_axes(plane_sample("opencv"), axes)
-    assert (with_axes(there, "opencv").normal == plane_sample("opencv").normal).all()
+    turned = with_axes(plane_sample("opencv"), axes)
+    assert (with_axes(turned, "opencv").normal == plane_sample("opencv").normal).all()
 
 
-def test_axes_are_where_their_names_say():
+def test_axes_have_their_named_directions():
     up, forward = np.array([0, 0, 1.0]), np.array([0, 1.0, 0])  # published
     assert (axes_from_axes("opencv", "published") @ up == [0, -1, 0]).all()
     assert (axes_from_axes("opencv", "published") @ forward == [0, 0, 1]).all()

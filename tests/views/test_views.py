@@ -29,7 +29,7 @@ def root(tmp_path: Path) -> Path:
     return tmp_path / "root"
 
 
-def test_a_sample_holds_what_the_files_hold(root):
+def test_a_sample_equals_its_files(root):
     sample = pbrs_farm.open(root)[1].sample(SampleRequest(LAYERS, "opengl_dl", axes="published"))
     stored = arrays_of_view(1)
     assert (sample.id, sample.house, sample.room) == ("one-00000001/0_0_1", "one-00000001", "0_0")
@@ -44,7 +44,7 @@ def test_a_sample_holds_what_the_files_hold(root):
     assert sample.size == SIZE
 
 
-def test_only_what_is_asked_for_is_read(root):
+def test_only_requested_layers_are_read(root):
     remove(root, f"{VIEW}/depth.png")
     (root / VIEW / "instance.png").write_bytes(b"damaged")
     sample = pbrs_farm.open(root)[1].sample(SampleRequest(("colour",)))
@@ -71,17 +71,17 @@ def test_samples_have_the_same_bits_from_folder_memory_and_shards(root, tmp_path
             Packing(packed_size, modes=MODES, views_per_shard=2),
         )
         places.append(pbrs_farm.open(tmp_path / name))
-    kept = MemoryStore()
+    copied = MemoryStore()
     for file in (tmp_path / "small").iterdir():
-        kept.put(file.name, file.read_bytes())
-    places.append(pbrs_farm.open(kept))
+        copied.put(file.name, file.read_bytes())
+    places.append(pbrs_farm.open(copied))
     for views in zip(*places, strict=True):
-        first, *others = (view.sample(request) for view in views)
-        assert all(equal(first, other) for other in others)
+        first, *rest = (view.sample(request) for view in views)
+        assert all(equal(first, sample) for sample in rest)
         assert (views[0].k == views[1].k).all()
 
 
-def test_a_manifest_names_the_views_where_listing_is_dear():
+def test_a_manifest_names_the_views_if_listing_is_slow():
     store = MemoryStore()
     fill(store, HOUSES)
     rows = [{"key": key} for key in store.list("houses/one-00000001/")]
@@ -157,7 +157,7 @@ def test_a_damaged_file_and_one_of_another_size_are_named(root):
         pbrs_farm.open(root)[1].sample(SampleRequest(("class40",)))
 
 
-def test_what_is_no_root_is_told(tmp_path):
+def test_a_folder_that_is_no_root_is_refused(tmp_path):
     with pytest.raises(BadInput, match="no such folder"):
         pbrs_farm.open(tmp_path / "nowhere")
     with pytest.raises(BadInput, match="no finished view"):
@@ -176,7 +176,7 @@ def test_what_is_no_root_is_told(tmp_path):
         ({"size": (0, 3)}, "expected a width"),
     ],
 )
-def test_a_request_that_cannot_be_is_told(fields, match):
+def test_an_impossible_request_is_refused(fields, match):
     with pytest.raises(BadInput, match=match):
         SampleRequest(**fields)
 
@@ -193,7 +193,7 @@ def test_views_can_be_sent_to_another_process(root, tmp_path):
 def s3_like() -> S3Store:
     """An S3 store whose client keeps its objects in memory."""
     store = S3Store("bucket", "some/prefix", S3Settings())
-    store._client = obstore.store.MemoryStore()
+    store.client = obstore.store.MemoryStore()
     return store
 
 
@@ -211,10 +211,10 @@ def test_samples_have_the_same_bits_from_s3(root, tmp_path):
         assert all(equal(a, view.sample(request)) for a, view in zip(expected, views, strict=True))
 
 
-def test_an_s3_store_is_opened_anew_in_another_process():
+def test_an_s3_store_is_reopened_in_another_process():
     sent = pickle.loads(pickle.dumps(s3_like()))
     assert sent.url == "s3://bucket/some/prefix"
-    assert isinstance(sent._client, obstore.store.S3Store)
+    assert isinstance(sent.client, obstore.store.S3Store)
 
 
 def test_stored_layers_are_read_by_name(root):
@@ -234,7 +234,7 @@ def test_stored_layers_are_read_by_name(root):
         view.layer("albedo")
 
 
-def test_only_what_a_selection_keeps_is_read(root):
+def test_only_selected_views_are_read(root):
     rows = [{"house": "one-00000001", "view": f"0_0_{k}", "kept": k != 1} for k in range(3)]
     (root / "selection").mkdir()
     (root / "selection/run.jsonl").write_text("".join(json.dumps(row) + "\n" for row in rows))

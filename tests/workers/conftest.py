@@ -29,7 +29,7 @@ def redis_server(tmp_path_factory: pytest.TempPathFactory) -> Iterator[RedisServ
 
 @pytest.fixture
 def farm(tmp_path: Path) -> Iterator[SmallFarm]:
-    """Real processes around a Redis of their own; all of them are ended afterwards."""
+    """Real processes around a private Redis; all of them end with the test."""
     (tmp_path / "redis").mkdir()
     server = RedisServer(tmp_path / "redis")
     server.start()

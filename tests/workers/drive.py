@@ -1,4 +1,4 @@
-"""Drives a ledger by hand, as a coordinator and workers would, without Celery."""
+"""Drives a ledger by hand, in place of a coordinator and workers, without Celery."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ BATCHES = (("a", "b"), ("c",))
 
 @dataclass
 class Drive:
-    """A job of n houses in a ledger, with a leader and any worker's hands."""
+    """A job of n houses in a ledger, with a leader and methods that act as any worker."""
 
     ledger: RedisLedger
     job: JobSpec
@@ -33,14 +33,14 @@ class Drive:
 
     def claim(self, task: str, worker: str = "w1", *, direct: bool = False) -> Claim:
         config = replace(self.ledger.config, worker=worker)
-        other = RedisLedger(config, self.ledger.client)
-        return other.claim(
+        worker_ledger = RedisLedger(config, self.ledger.client)
+        return worker_ledger.claim(
             self.job.job_id, task, token=f"{worker}:{task}:{self.ran[task]}",
             recipe=self.job.recipe.digest(), direct=direct,
         )  # fmt: skip
 
     def run(self, task: str, batches: tuple[tuple[str, ...], ...] = BATCHES) -> None:
-        """Claim, and finish well."""
+        """Claim the task and finish it without a fault."""
         claim = self.claim(task)
         assert claim.verdict == "run", (task, claim)
         self.ran[task] += 1
@@ -56,11 +56,11 @@ class Drive:
     def fail(self, task: str, claim: Claim, kind: FaultClass = "crash", worker: str = "w1") -> str:
         fault = Fault(fault=kind, fingerprint=kind, message=kind, worker=worker)
         config = replace(self.ledger.config, worker=worker)
-        other = RedisLedger(config, self.ledger.client)
-        return other.fail(self.job.job_id, task, claim.token, fault, delay_s=0.0)
+        worker_ledger = RedisLedger(config, self.ledger.client)
+        return worker_ledger.fail(self.job.job_id, task, claim.token, fault, delay_s=0.0)
 
     def run_all(self) -> None:
-        """Dispatch and run until nothing comes any more."""
+        """Dispatch and run until no task is left."""
         while tasks := self.dispatch():
             for task in tasks:
                 self.run(task)

@@ -1,7 +1,7 @@
-"""A runner that makes small files instead of pictures, and misbehaves when a control file says so.
+"""A runner that writes small files instead of pictures, and fails as control files command.
 
-Outputs depend on ids only, as the real steps' do. Every start is noted in `control/starts`, so that
-a test can tell what ran twice. Control files: crash.<house>, hang.<house>, bug.<house>,
+Outputs depend on ids only, like those of the real steps. Every start is appended to `control/starts`, so that
+a test can find repeated tasks. Control files: crash.<house>, hang.<house>, bug.<house>,
 data.<house>, full (storage is full), away (storage does not answer), slow (seconds per view).
 """
 
@@ -35,7 +35,7 @@ def runner(config: FarmConfig, on_waiting: OnText) -> FakeRunner:
         unhealthy = UnhealthyStore(inner, control_folder())
         return RetryingStore(unhealthy, config.storage_patience_s, on_waiting)
 
-    # As the real runner's: patience lies below the layout.
+    # As in the real runner, retries are below the layout.
     if isinstance(store, LaidOutStore):
         return FakeRunner(store.around(with_patience), control_folder())
     return FakeRunner(with_patience(store), control_folder())
@@ -125,10 +125,10 @@ class FakeRunner:
         missing = {}
         for number, views in enumerate(batches_of(house)):
             stages = {"gl": "truth", "light": "light"}
-            left = [
+            unfinished = [
                 s for s in spec.batch_stages if any(f"{stages[s]}.{v}" not in done for v in views)
             ]
-            missing[str(number)] = left[0] if left else ""
+            missing[str(number)] = unfinished[0] if unfinished else ""
         reduced = not any(missing.values()) and (
             self._store.head(keys.house_key(house, "manifest.jsonl")) is not None
         )
@@ -141,8 +141,8 @@ class FakeRunner:
             return
         self._work()
         key = keys.view_key(house, view, f"{step}.png") if view else keys.house_key(house, step)
-        made = {key: f"{house} {step} {view}".encode() * 10}
-        put_done(self._store, marker, keys.digest(house, step, view).encode(), made)
+        outputs = {key: f"{house} {step} {view}".encode() * 10}
+        put_done(self._store, marker, keys.digest(house, step, view).encode(), outputs)
 
     def _work(self) -> None:
         slow = self._control / "slow"

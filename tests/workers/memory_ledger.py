@@ -1,4 +1,4 @@
-"""A ledger and a registry of workers in memory: what a slot and a coordinator see of a farm."""
+"""A ledger and a registry of workers in memory: a farm as a slot and a coordinator see it."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ from workers.ledger.task_ledger import (
 
 @dataclass
 class MemoryLedger:
-    """Implements workers.ledger.task_ledger.Ledger for tasks a test puts into it."""
+    """Implements workers.ledger.task_ledger.Ledger for tasks that a test inserts."""
 
     ready: list[str] = field(default_factory=list)
     queued: list[str] = field(default_factory=list)
@@ -31,19 +31,23 @@ class MemoryLedger:
     attempts: Counter[str] = field(default_factory=Counter)
     finished: dict[str, Finished] = field(default_factory=dict)
     faults: dict[str, list[Fault]] = field(default_factory=lambda: defaultdict(list))
-    affine: dict[str, str] = field(default_factory=dict)  # task -> the next of its house
-    refusal: Claim | None = None  # what every claim is answered with
-    heartbeats: list[str] = field(default_factory=list)  # answers to come; then "ok"
+    affine: dict[str, str] = field(default_factory=dict)  # task -> the next task of its house
+    refusal: Claim | None = None  # the answer to every claim
+    heartbeats: list[str] = field(default_factory=list)  # answers to come; "ok" after the last
     n_heartbeats: int = 0
-    beaten: list[list[str]] = field(default_factory=list)  # whose leases a heartbeat kept
-    reports: list[list[str]] = field(default_factory=list)  # what was finished together
+    beaten: list[list[str]] = field(
+        default_factory=list
+    )  # tasks whose leases each heartbeat renewed
+    reports: list[list[str]] = field(default_factory=list)  # tasks that were reported together
     n_away: int = 0  # calls that fail before Redis answers again
     leader: str = ""
     reaped: int = 0
     fields: dict[str, str] = field(default_factory=lambda: {"recipe": "r", "state": "running"})
-    seconds: dict[str, float] = field(default_factory=dict)  # stage -> of tasks that are done
+    seconds: dict[str, float] = field(
+        default_factory=dict
+    )  # stage -> seconds of its finished tasks
     others: dict[str, str] = field(default_factory=dict)  # another job -> its state
-    lengths: Counter[str] = field(default_factory=Counter)  # of the queues
+    lengths: Counter[str] = field(default_factory=Counter)  # queue -> its length
 
     def _answer(self) -> None:
         if self.n_away > 0:
@@ -130,11 +134,11 @@ class MemoryLedger:
         if self.leader != token:
             return None
         sent = []
-        left = dict(room)
+        free = dict(room)
         for task in list(self.ready):
             stage = task.rpartition("/")[2]
-            if left[stage] > 0:
-                left[stage] -= 1
+            if free[stage] > 0:
+                free[stage] -= 1
                 self.ready.remove(task)
                 self.queued.append(task)
                 sent.append(task)

@@ -1,4 +1,4 @@
-"""A real redis-server on a free port, with an append-only file, that can be stopped and killed."""
+"""A real redis-server on a free port, with an append-only file; it can be stopped and killed."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ def free_port() -> int:
 
 
 class RedisServer:
-    """One server process; its data outlive it in `folder`."""
+    """One server process; its data in `folder` outlive it."""
 
     def __init__(self, folder: Path, *options: str) -> None:
         if shutil.which("redis-server") is None:

@@ -1,4 +1,4 @@
-"""Ways to make a real redis-server refuse for a while, each by what makes one refuse in life."""
+"""Ways to make a real redis-server refuse for a while, each by its usual cause."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.workers.redis_server import RedisServer
 
 @contextmanager
 def readonly(server: RedisServer) -> Iterator[None]:
-    """It is a replica by now, of a master that does not answer."""
+    """The server is a replica of a master that does not answer."""
     server.client.replicaof("127.0.0.1", "1")
     try:
         yield
@@ -26,21 +26,21 @@ def readonly(server: RedisServer) -> Iterator[None]:
 
 @contextmanager
 def noreplicas(server: RedisServer) -> Iterator[None]:
-    """Its replicas are away."""
+    """The server's replicas are away."""
     with configured(server, "min-replicas-to-write", "1"):
         yield
 
 
 @contextmanager
 def oom(server: RedisServer) -> Iterator[None]:
-    """Its memory is full."""
+    """The server's memory is full."""
     with configured(server, "maxmemory", "1"):
         yield
 
 
 @contextmanager
 def misconf(server: RedisServer) -> Iterator[None]:
-    """It cannot save: where its file belongs is a folder."""
+    """The server cannot save: its file's path is a folder."""
     client, folder = server.client, server.folder / "dump.rdb"
     folder.mkdir()
     with configured(server, "save", "3600 1"):
@@ -54,7 +54,7 @@ def misconf(server: RedisServer) -> Iterator[None]:
 
 @contextmanager
 def busy(server: RedisServer) -> Iterator[None]:
-    """Somebody's script does not end."""
+    """A script on the server does not end."""
     client = server.client
     with configured(server, "busy-reply-threshold", "10"):
         script = threading.Thread(target=_endless, args=(server,))
@@ -75,7 +75,7 @@ REFUSALS: Final[dict[str, Callable[[RedisServer], AbstractContextManager[None]]]
 
 @contextmanager
 def configured(server: RedisServer, name: str, value: str) -> Iterator[None]:
-    """The server with a setting, which is as before afterwards."""
+    """The server with a setting, restored afterwards."""
     client = server.client
     before = client.config_get(name)[name]
     client.config_set(name, value)

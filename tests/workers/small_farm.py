@@ -34,13 +34,13 @@ REPO = Path(__file__).parents[2]
 
 
 class SmallFarm:
-    """Starts processes and ends every one of them; `control` steers the fake runner."""
+    """Starts processes and ends every one of them; the folder `control` steers the fake runner."""
 
     def __init__(
         self, folder: Path, redis: RedisServer, *, s3: Store | None = None,
         runner: str = FAKE_RUNNER, redis_url: str = "", **settings: object,
     ) -> None:  # fmt: skip
-        self.redis_url = redis_url or redis.url  # the processes' way to it
+        self.redis_url = redis_url or redis.url  # the address that the processes use
         self.folder = folder
         self.redis = redis
         self.runner = runner
@@ -103,7 +103,7 @@ class SmallFarm:
         self.start(name, "workers.node.supervisor", slots=slots, prefix=prefix)
 
     def submit(self, n_houses: int, prefix: str = "h", token: str = "", **fields: object) -> str:
-        """A job of so many houses; `job` is the last one, `houses` are those of all."""
+        """Submit a job of n_houses; `job` is the last one, `houses` are those of all."""
         names = [f"{prefix}{k:03d}" + "x" * (k % 2) for k in range(n_houses)]
         self.houses = sorted({*self.houses, *names})
         houses = [HouseEntry(house_id=h) for h in names]
@@ -113,7 +113,7 @@ class SmallFarm:
         return self.job
 
     def kill(self, name: str, sign: signal.Signals = signal.SIGKILL) -> None:
-        """The process and all it started, as a node that loses power."""
+        """Kill the process and its children, like a node that loses power."""
         process = self.processes.pop(name)
         tree = descendants(process.pid)
         for pid in (process.pid, *tree):
@@ -127,7 +127,7 @@ class SmallFarm:
         self.farm.ledger.client.close()
 
     def wait(self, true: Callable[[], bool], seconds: float, what: str) -> float:
-        """Seconds until `true()`; fails with the farm's logs."""
+        """Seconds until `true()` holds; on timeout fails with the farm's logs."""
         began = time.monotonic()
         while time.monotonic() - began < seconds:
             if true():
@@ -147,17 +147,17 @@ class SmallFarm:
         return self.wait(lambda: self.state() == "done", seconds, "the job is done")
 
     def running(self) -> int:
-        """Tasks being run now."""
+        """Number of tasks that run now."""
         view = self.farm.view(self.job)
         return int(sum(n for k, n in view.counts.items() if k.endswith(":r")))
 
     def starts(self) -> Counter[str]:
-        """Task -> how often a runner began it."""
+        """Task -> number of times that a runner began it."""
         path = self.control / "starts"
         return Counter(path.read_text().splitlines() if path.exists() else ())
 
     def objects(self) -> dict[str, bytes]:
-        """What is stored, the farm's own jobs/, the recipe and the layout apart."""
+        """The stored objects, apart from jobs/, the recipe and the layout."""
         return {
             key: self.store.get(key)
             for key in self.store.list()
@@ -165,7 +165,7 @@ class SmallFarm:
         }
 
     def expected(self, *, without: tuple[str, ...] = ()) -> dict[str, bytes]:
-        """What one process makes of the same houses, without a farm."""
+        """The objects that one process makes of the same houses, without a farm."""
         folder = self.folder / "alone"
         (folder / "control").mkdir(parents=True, exist_ok=True)
         store = FolderStore(folder / "store")
@@ -187,11 +187,14 @@ class SmallFarm:
         return {key: store.get(key) for key in store.list()}
 
     def check_complete(self, *, n_repeats: int) -> int:
-        """Nothing lost, nothing else there, at most n_repeats starts beyond the first; how many."""
-        there, wanted = self.objects(), self.expected()
-        missing, more = sorted(wanted.keys() - there.keys()), sorted(there.keys() - wanted.keys())
+        """Check that the store is complete, without extra objects. Returns the repeated starts (<= n_repeats)."""
+        objects, expected = self.objects(), self.expected()
+        missing, more = (
+            sorted(expected.keys() - objects.keys()),
+            sorted(objects.keys() - expected.keys()),
+        )
         assert (missing, more) == ([], []), f"missing {missing}, too many {more}"
-        assert [key for key in wanted if there[key] != wanted[key]] == []
+        assert [key for key in expected if objects[key] != expected[key]] == []
         view = self.farm.view(self.job)
         n_batches = sum(len(batches_of(h)) for h in self.houses)
         n_markers = Counter(

@@ -9,7 +9,7 @@ from types import TracebackType
 
 
 class StallingProxy:
-    """Forwards connections to a port of this machine; `stall` silences those there are."""
+    """Forwards connections to a port of this machine; `stall` silences the open ones."""
 
     def __init__(self, port: int) -> None:
         self._to = port
@@ -23,7 +23,7 @@ class StallingProxy:
 
     @property
     def n_connections(self) -> int:
-        """How many were ever made."""
+        """Number of connections ever accepted."""
         return len(self._pairs)
 
     def __enter__(self) -> StallingProxy:
@@ -41,7 +41,7 @@ class StallingProxy:
             far.close()
 
     def stall(self, *, also_new: bool = False) -> None:
-        """Let no byte through on any connection there is. also_new: nor on those to come."""
+        """Let no byte through on any open connection. also_new: nor on later ones."""
         self._stalls_new = also_new
         for _near, _far, is_stalled in self._pairs:
             is_stalled.set()
@@ -66,6 +66,6 @@ def _forward(a: socket.socket, b: socket.socket, is_stalled: threading.Event) ->
         while data := a.recv(65536):
             if not is_stalled.is_set():
                 b.sendall(data)
-        # The end of a connection is as silent as the rest of it.
+        # The end of a connection is silent as well.
         if not is_stalled.is_set():
             b.shutdown(socket.SHUT_WR)

@@ -1,4 +1,4 @@
-"""Alerts: the rules hold what they say by promtool, and fire in a real Prometheus that reads a farm."""
+"""Alerts: promtool confirms the rules, and they fire in a real Prometheus that reads a farm."""
 
 from __future__ import annotations
 
@@ -32,18 +32,18 @@ def test_each_rule_begins_when_it_should_by_promtool() -> None:
         ("check", RULES),
         ("test", Path(__file__).with_name("prometheus_alerts_test.yaml")),
     ):
-        found = subprocess.run(
+        completed = subprocess.run(
             ["promtool", words[0], "rules", str(words[1])],
             capture_output=True,
             text=True,
             check=False,
         )
-        assert found.returncode == 0, found.stdout + found.stderr
+        assert completed.returncode == 0, completed.stdout + completed.stderr
 
 
 @contextmanager
 def prometheus(folder: Path, metrics_port: int) -> Iterator[Callable[[], set[str]]]:
-    """A Prometheus that asks each second, its rules' minutes made seconds; the alerts that fire now."""
+    """A Prometheus that scrapes each second, with the minutes of its rules as seconds; yields the firing alerts."""
     rules = re.sub(r"(?<=for: )\d+m", "2s", RULES.read_text()).replace("[10m]", "[20s]")
     (folder / "rules.yaml").write_text(rules.replace("[5m]", "[5s]"))
     (folder / "prometheus.yml").write_text(
@@ -82,7 +82,7 @@ def prometheus(folder: Path, metrics_port: int) -> Iterator[Callable[[], set[str
 def test_alerts_fire_in_a_prometheus_that_reads_a_farm_in_trouble(
     ledger: RedisLedger, tmp_path: Path
 ) -> None:
-    # A job of which tasks fail, a worker that vanished, a queue nobody takes.
+    # A job with failing tasks, a vanished worker, a queue without workers.
     d = drive(ledger, 40, max_same_failure=99, max_quarantined=99, max_attempts=9)
     Registry(with_config(ledger, worker="w1", queues=("reduce",))).heartbeat()
     Registry(with_config(ledger, worker="w2")).heartbeat()
@@ -90,14 +90,14 @@ def test_alerts_fire_in_a_prometheus_that_reads_a_farm_in_trouble(
     tasks = d.dispatch()
     port = free_port()
     server, thread = serve_metrics(replace(ledger.config, metrics_port=port), ledger)
-    found: set[str] = set()
+    fired: set[str] = set()
     began, troubled_at = time.monotonic(), 0.0
     try:
         with prometheus(tmp_path, port) as firing:
-            while time.monotonic() - began < 90 and len(found) < 5:
-                found |= firing()
+            while time.monotonic() - began < 90 and len(fired) < 5:
+                fired |= firing()
                 if not troubled_at and time.monotonic() - began > 8:
-                    assert found <= {"PbrsStuck"}
+                    assert fired <= {"PbrsStuck"}
                     troubled_at = time.monotonic()
                     client.zadd(f"{g}workers", {"w2": ledger.now() - 600})
                     client.lpush(f"{g}light.gpu", "message")
@@ -117,4 +117,4 @@ def test_alerts_fire_in_a_prometheus_that_reads_a_farm_in_trouble(
         "PbrsStuck",
         "PbrsStoreUnhealthy",
     }
-    assert expected <= found
+    assert expected <= fired

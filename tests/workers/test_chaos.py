@@ -1,8 +1,8 @@
 """Faults while a job runs: real processes are killed, Redis is stopped, storage goes away.
 
-After each: the stored objects equal those of a single run byte for byte, the ledger counts what
-storage holds, and no more was repeated than the fault explains. PBRS_CHAOS_TABLE names a file that
-takes a line per test (fault, lost, repeated, seconds to recover): the table of docs/lab/farm.md.
+After each: the stored objects equal those of a single run byte for byte, the ledger counts match
+storage, and only as much was repeated as the fault explains. PBRS_CHAOS_TABLE names a file that
+gets a line per test (fault, lost, repeated, seconds to recover): the table of docs/lab/farm.md.
 """
 
 from __future__ import annotations
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.chaos
 
 
 def begin(farm: SmallFarm, n_houses: int = 6, slow_s: float = 0.3) -> None:
-    """Coordinator, two workers and a job whose tasks take long enough to be hit."""
+    """Start a coordinator, two workers and a job whose tasks take long enough to be interrupted."""
     (farm.control / "slow").write_text(str(slow_s))
     farm.coordinator()
     farm.worker("w1")
@@ -37,7 +37,7 @@ def begin(farm: SmallFarm, n_houses: int = 6, slow_s: float = 0.3) -> None:
 
 
 def pool_processes(farm: SmallFarm, worker: str) -> list[int]:
-    """Celery's children: those that hold a renderer."""
+    """Celery's child processes, which each hold a renderer."""
     return [
         int(Path(f"/proc/{pid}/stat").read_text().split()[3]) for pid in renderers(farm, worker)
     ]
@@ -177,8 +177,8 @@ def test_a_house_that_fails_each_time(farm: SmallFarm, fault: str) -> None:
     seconds = farm.wait_done(90)
     starts = farm.starts()
     assert {starts["h002/0/gl"], starts["h002/1/gl"]} == {3}
-    others = {k: v for k, v in farm.expected(without=("h002",)).items() if k != "manifest.jsonl"}
-    assert others.items() <= farm.objects().items()
+    intact = {k: v for k, v in farm.expected(without=("h002",)).items() if k != "manifest.jsonl"}
+    assert intact.items() <= farm.objects().items()
     view = farm.farm.view(farm.job)
     assert view.counts["houses:quarantined"] == 1
     assert view.counts["houses:done"] == 5
@@ -289,7 +289,7 @@ def test_a_worker_whose_clock_is_a_minute_off(farm: SmallFarm) -> None:
     note("workers' clocks a minute off, both ways", farm, farm.check_complete(n_repeats=0), seconds)
 
 
-def test_a_worker_told_to_leave_is_seen_until_its_task_is_done(farm: SmallFarm) -> None:
+def test_a_draining_worker_is_listed_until_its_task_is_done(farm: SmallFarm) -> None:
     (farm.control / "slow").write_text("8")
     farm.coordinator()
     farm.worker("w1")
@@ -298,7 +298,7 @@ def test_a_worker_told_to_leave_is_seen_until_its_task_is_done(farm: SmallFarm) 
     farm.processes["w1"].send_signal(signal.SIGTERM)
     config = replace(farm.farm.config, worker="w1", scratch=farm.folder / "scratch")
     farm.wait(config.leaving_file.exists, 10, "it begins to leave")
-    # Its task runs on; the probe's file and the row of `workers` stay.
+    # Its task continues; the probe's file and the row of `workers` remain.
     time.sleep(2)
     assert farm.running() > 0
     assert config.heartbeat_file.exists()
@@ -383,7 +383,7 @@ def test_redis_refuses_for_a_while_a_farm_without_work(farm: SmallFarm, prefix: 
     seconds = farm.wait_done(120)
     for log in farm.folder.glob("*.log"):
         assert "Traceback" not in log.read_text(), log
-    assert set(farm.starts().values()) <= {1, 2}  # the job's own task is of either job
+    assert set(farm.starts().values()) <= {1, 2}  # the job's final task belongs to both jobs
     note(f"Redis answers {prefix} for 6 s to an idle farm", farm, 0, seconds)
 
 
@@ -416,11 +416,11 @@ def test_a_proxy_before_redis_stalls(tmp_path: Path) -> None:
         farm = SmallFarm(tmp_path, server, redis_url=proxy.url)
         try:
             begin(farm, n_houses=10)
-            # Connections that are there are open and dead from now on; new ones are well.
+            # From now on open connections are half-open; new ones work.
             proxy.stall()
             n_before = sum(farm.starts().values())
             farm.wait(lambda: sum(farm.starts().values()) > n_before + 4, 35, "it goes on")
-            # A task whose lease ran out meanwhile goes to its worker again after a minute.
+            # A task whose lease expired meanwhile is sent to its worker again after a minute.
             seconds = farm.wait_done(240)
             assert all(process.poll() is None for process in farm.processes.values())
             repeated = farm.check_complete(n_repeats=6)

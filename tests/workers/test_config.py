@@ -11,7 +11,7 @@ from pbrs_farm.store.secret import Secret
 from workers.config import FarmConfig, Limits, config_from_environment, make_scratch
 
 
-def test_every_setting_stands_in_the_docs() -> None:
+def test_every_setting_is_in_the_docs() -> None:
     docs = (Path(__file__).parents[2] / "docs/farm/settings.md").read_text()
     elsewhere = {"redis_url", "store_url", "store", "limits", "webhook", "token"}
     names = {f"_{f.name.upper()}" for f in fields(FarmConfig) if f.name not in elsewhere}
@@ -22,7 +22,7 @@ def test_every_setting_stands_in_the_docs() -> None:
 def test_where_scratch_is_named_no_temporary_folder_is_looked_for(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # As in a container whose root is read-only and has no /tmp.
+    # Like a container with a read-only root and no /tmp.
     def none_there() -> str:
         raise FileNotFoundError("No usable temporary directory found")
 
@@ -31,7 +31,7 @@ def test_where_scratch_is_named_no_temporary_folder_is_looked_for(
     assert config_from_environment(named).scratch == tmp_path
 
 
-def test_scratch_is_made_and_a_file_in_its_place_is_one_line(tmp_path: Path) -> None:
+def test_scratch_is_created_and_a_file_in_its_place_is_one_line(tmp_path: Path) -> None:
     config = FarmConfig(Secret(""), worker="w", scratch=tmp_path / "deep" / "scratch")
     make_scratch(config)
     assert config.scratch.is_dir()

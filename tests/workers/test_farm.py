@@ -1,4 +1,4 @@
-"""Real Redis, real Celery, real renderer processes: a job runs to its end, and ends in order."""
+"""Real Redis, real Celery, real renderer processes: a job runs to its end, and processes end cleanly."""
 
 from __future__ import annotations
 
@@ -49,7 +49,7 @@ def test_hostile_messages_are_dropped_and_a_killed_renderer_replaced(farm: Small
 
 
 def hostile_messages() -> list[str]:
-    """Raw broker messages: an unknown task, a giant one, a pickle, and ids that are none."""
+    """Raw broker messages: an unknown task, a giant one, a pickle, and invalid ids."""
 
     def message(task: str, args: list[str], kind: str = "application/x-pbrs-json") -> str:
         body = base64.b64encode(json.dumps([args, {}, {}]).encode()).decode()
@@ -87,7 +87,7 @@ store_from_url("s3://bucket/prefix").put("k", b"")
     assert "must not use storage" in done.stderr
 
 
-def test_no_secret_stands_on_a_command_line_or_in_a_log() -> None:
+def test_no_secret_is_on_a_command_line_or_in_a_log() -> None:
     config = config_from_environment(
         {"PBRS_REDIS_URL": "redis://redis:6379/0", "PBRS_REDIS_PASSWORD": "hu/sh"}
     )
@@ -108,7 +108,7 @@ def test_no_secret_stands_on_a_command_line_or_in_a_log() -> None:
         ("PBRS_FARM_STORE_URL", "memory:"),
     ],
 )
-def test_a_setting_that_is_none_is_one_line(name: str, value: str) -> None:
+def test_an_unknown_setting_is_one_line(name: str, value: str) -> None:
     with pytest.raises(BadInput, match=name) as caught:
         config_from_environment({name: value})
     assert "\n" not in str(caught.value)

@@ -1,4 +1,4 @@
-"""Homes by seed on a farm: a worker's tasks leave what a run on one machine leaves."""
+"""Homes by seed on a farm: a worker's tasks write the same files as a run on one machine."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def small() -> Recipe:
 
 
 def farmed(store: Store, recipe: Recipe) -> JobSpec:
-    """Do every task of a job as two workers would, each house by another one."""
+    """Run every task of a job like two workers, each house by a different one."""
     entries = [entry for entry, _ref in entries_from_arguments(WORDS)]
     houses, spec = completed(entries, new_spec(recipe, n_views=1))
     store.put(job_key(spec.job_id), spec.model_dump_json().encode())
@@ -53,7 +53,7 @@ def farmed(store: Store, recipe: Recipe) -> JobSpec:
 
 
 def products(files: dict[str, bytes]) -> dict[str, bytes]:
-    """Houses, labels and pictures; not markers, which hold seconds and names."""
+    """Houses, labels and pictures; no markers, because they hold seconds and names."""
     return {k: v for k, v in files.items() if k.startswith("houses/") and "/done/" not in k}
 
 
@@ -106,7 +106,7 @@ def test_a_worker_without_the_furniture_takes_it_from_the_store_for_a_made_home(
     ((entry, empty),) = entries_from_arguments(["made:2,furniture=none"])
     furnished = empty.model_copy(update={"location": "made:2"})
     assert (has_own_furniture(empty), has_own_furniture(furnished)) == (False, True)
-    # b"deb" is no package, so the home that is made has no furniture.
+    # b"deb" is no package, so the generated home has no furniture.
     monkeypatch.setattr("workers.node.house_runner.has_own_furniture", lambda _source: True)
     name = f"{furniture_package.PACKAGE}_{furniture_package.TESTED_VERSION}_all.deb"
     store = MemoryStore()
@@ -122,7 +122,7 @@ def test_a_worker_without_the_furniture_takes_it_from_the_store_for_a_made_home(
 
 
 class _Entry:
-    """Stands for an entry point: what it loads is a function of this module."""
+    """An entry point that loads a function of this module."""
 
     def load(self) -> object:
         return _without_sofa
@@ -134,9 +134,9 @@ def _without_sofa(seed: int) -> pf.Home:
 
 @pytest.mark.long
 def test_homes_of_a_plugin_are_made_on_workers(monkeypatch: pytest.MonkeyPatch) -> None:
-    own = Plugin("homes", "two", "lab", "1.0", _Entry())  # type: ignore[arg-type]
+    plugin = Plugin("homes", "two", "lab", "1.0", _Entry())  # type: ignore[arg-type]
     monkeypatch.setattr(
-        "pbrs_farm.core.plugins.plugins", lambda group: {"two": own} if group == "homes" else {}
+        "pbrs_farm.core.plugins.plugins", lambda group: {"two": plugin} if group == "homes" else {}
     )
     monkeypatch.setattr("tests.workers.test_homes_by_seed.WORDS", ["plugin:two,1", "plugin:two,2"])
     store = MemoryStore()
@@ -146,10 +146,10 @@ def test_homes_of_a_plugin_are_made_on_workers(monkeypatch: pytest.MonkeyPatch) 
         for key in store.list("houses/")
         if key.count("/") == 2 and key.endswith("/house.json")
     }
-    # What is removed leaves its place empty, so that no instance id shifts.
+    # A removed item leaves its place empty, so that no instance id shifts.
     names = [
         {item["name"] for item in house["items"] if item["surfaces"]} for house in houses.values()
     ]
-    assert ["sofa" in one for one in names] == [False, True]
+    assert ["sofa" in name for name in names] == [False, True]
     refs = [ref for _entry, ref in entries_from_arguments(["plugin:two,1"])]
     assert needed_plugins(refs, small(), ()) == ("two of lab 1.0",)

@@ -1,4 +1,4 @@
-"""Homes, their variants and the user's libraries on their way to the workers."""
+"""Homes, their variants and the user's libraries are sent to the workers."""
 
 from __future__ import annotations
 
@@ -29,9 +29,9 @@ def cache(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
 
 
 def test_each_home_goes_out_once_dressed_by_each_seed():
-    found = entries_from_arguments(["builtin"], (1, 2))
-    assert [entry.house_id[-3:] for entry, _ref in found] == ["-d1", "-d2"]
-    assert [SourceRef.model_validate_json(e.source).dress_seed for e, _ref in found] == [1, 2]
+    entries = entries_from_arguments(["builtin"], (1, 2))
+    assert [entry.house_id[-3:] for entry, _ref in entries] == ["-d1", "-d2"]
+    assert [SourceRef.model_validate_json(e.source).dress_seed for e, _ref in entries] == [1, 2]
 
 
 def test_the_variants_of_a_home_share_one_file_in_the_store(tmp_path: Path):
@@ -45,8 +45,8 @@ def test_the_variants_of_a_home_share_one_file_in_the_store(tmp_path: Path):
     ]
     store = MemoryStore()
     upload(store, variants)
-    held = [key for key in store.list("jobs/sources/") if key.endswith(".sh3d")]
-    assert held == ["jobs/sources/home-1/home.sh3d"]
+    homes = [key for key in store.list("jobs/sources/") if key.endswith(".sh3d")]
+    assert homes == ["jobs/sources/home-1/home.sh3d"]
 
 
 def test_a_users_library_travels_by_its_content_and_no_path_does(tmp_path: Path, cache: Path):
@@ -61,11 +61,11 @@ def test_a_users_library_travels_by_its_content_and_no_path_does(tmp_path: Path,
     assert words[0] == "generated"
     assert Path(words[1]).read_bytes() == b"models"
     assert Path(words[1]).name == "mine.sh3f"
-    # Where the library lies is no part of what is made.
+    # The library's path does not change the output.
     assert local_catalogue(store, recipe).digest("read") == recipe.digest("read")
 
 
-def test_a_worker_takes_the_furniture_from_the_store_where_a_house_is_dressed(
+def test_a_worker_takes_the_furniture_of_a_dressed_house_from_the_store(
     cache: Path, monkeypatch: pytest.MonkeyPatch
 ):
     monkeypatch.setattr(homes_package, "cached", object)
@@ -100,15 +100,15 @@ def test_a_worker_dresses_the_variant_that_its_task_names(monkeypatch: pytest.Mo
 
 
 def test_made_homes_put_no_file_into_the_store(cache: Path):
-    # The package is in the cache of each machine, or goes into the store by itself.
+    # The package is in the cache of each machine, or is uploaded to the store.
     words = [f"made:{seed},furniture=none" for seed in range(1, 4)]
-    # An empty home needs none, also where it is cached.
+    # An empty home needs no package, even if it is cached.
     cache.mkdir(parents=True, exist_ok=True)
     (cache / f"{furniture_package.PACKAGE}_1.8-1_all.deb").write_bytes(b"deb")
-    found = entries_from_arguments(words)
-    assert [SourceRef.model_validate_json(e.source).location for e, _ref in found] == words
+    entries = entries_from_arguments(words)
+    assert [SourceRef.model_validate_json(e.source).location for e, _ref in entries] == words
     store = MemoryStore()
-    upload(store, [ref for _entry, ref in found])
+    upload(store, [ref for _entry, ref in entries])
     assert list(store.list("")) == []
 
 
@@ -117,7 +117,7 @@ def test_a_worker_makes_the_home_that_was_submitted(cache: Path, tmp_path: Path)
     from pbrs_farm.prepare.read_source import read_house
 
     ((entry, ref),) = entries_from_arguments(["made:2,furniture=none"])
-    here = read_house(ref, Recipe().read)
-    there = read_house(SourceRef.model_validate_json(entry.source), Recipe().read)
-    assert there.id == here.id == entry.house_id
-    assert [item.id for item in there.items] == [item.id for item in here.items]
+    local_house = read_house(ref, Recipe().read)
+    worker_house = read_house(SourceRef.model_validate_json(entry.source), Recipe().read)
+    assert worker_house.id == local_house.id == entry.house_id
+    assert [item.id for item in worker_house.items] == [item.id for item in local_house.items]

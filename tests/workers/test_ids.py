@@ -23,7 +23,7 @@ from workers.node.house_runner import steps_before_views, steps_of_stage
 @pytest.mark.parametrize(
     "text", ["", "a/b", "a/b/c", "a/0/gl/x", "../x/gl", "a/0/rm -rf", "a\n/0/gl", "a/0/gl\n"]
 )
-def test_a_task_that_is_none_is_refused(text: str) -> None:
+def test_an_invalid_task_is_refused(text: str) -> None:
     with pytest.raises(BadInput, match="not a task"):
         task_from_text(text)
 
@@ -43,18 +43,18 @@ def test_every_stage_has_a_queue_and_back() -> None:
 
 
 def test_the_last_stage_of_a_batch_writes_the_view() -> None:
-    both = spec(1)
-    assert steps_of_stage(both, "gl") == ("truth", "opengl_dl", "opengl_il")
-    assert steps_of_stage(both, "light")[-1] == "view"
-    only_gl = both.model_copy(update={"modes": ("opengl_dl",), "batch_stages": ("gl",)})
+    both_stages = spec(1)
+    assert steps_of_stage(both_stages, "gl") == ("truth", "opengl_dl", "opengl_il")
+    assert steps_of_stage(both_stages, "light")[-1] == "view"
+    only_gl = both_stages.model_copy(update={"modes": ("opengl_dl",), "batch_stages": ("gl",)})
     assert steps_of_stage(only_gl, "gl") == ("truth", "opengl_dl", "view")
 
 
-def test_pairs_that_a_job_asks_for_are_made_with_its_house() -> None:
+def test_requested_pairs_are_made_with_their_house() -> None:
     assert steps_before_views(spec(1), "home-1")[:2] == ("house", "cameras")
-    asked = spec(1).model_copy(update={"pairs": True})
-    assert steps_before_views(asked, "home-1")[-1] == "pairs"
-    assert "pairs" not in steps_before_views(asked, "object_chair")
+    paired = spec(1).model_copy(update={"pairs": True})
+    assert steps_before_views(paired, "home-1")[-1] == "pairs"
+    assert "pairs" not in steps_before_views(paired, "object_chair")
 
 
 def test_keys_of_logs_and_failures_name_their_task_back() -> None:
@@ -62,11 +62,11 @@ def test_keys_of_logs_and_failures_name_their_task_back() -> None:
     for task in ("h1/0/light", "h1/-/geometry", "-/s3/shard", "-/-/job"):
         assert task_from_failed_key(job, failed_key(job, task)) == task
         logs = [log_key(job, task, k) for k in (1, 12)]
-        others = [log_key(job, "h1/1/light", 1), log_key(job, "h1/0/gl", 1)]
-        assert attempts_from_log_keys(job, task, [*others, *logs]) == {1: logs[0], 12: logs[1]}
+        other_keys = [log_key(job, "h1/1/light", 1), log_key(job, "h1/0/gl", 1)]
+        assert attempts_from_log_keys(job, task, [*other_keys, *logs]) == {1: logs[0], 12: logs[1]}
 
 
-def test_a_group_names_its_tasks_and_no_more_than_allowed() -> None:
+def test_a_group_names_its_tasks_up_to_a_limit() -> None:
     tasks = [TaskId("h", str(k), "gl") for k in (0, 1, 12)]
     assert group_text(tasks) == "h/0,1,12/gl"
     assert list(tasks_from_group("h/0,1,12/gl")) == tasks

@@ -1,8 +1,8 @@
-"""Against real infrastructure, named by the environment (docs/farm/settings.md says how to start it).
+"""Tests against real infrastructure, named by the environment (docs/farm/settings.md says how to start it).
 
 S3: PBRS_S3_ENDPOINT, PBRS_S3_ACCESS_KEY, PBRS_S3_SECRET_KEY, PBRS_S3_ALLOW_HTTP, PBRS_S3_BUCKET.
 Redis with TLS and ACL: PBRS_TEST_TLS_REDIS (URL), PBRS_FARM_REDIS_CA.  Slurm: PBRS_TEST_SLURM=1.
-Docker and kubectl are used when they are there.
+Docker and kubectl are used if they are installed.
 """
 
 from __future__ import annotations
@@ -71,7 +71,7 @@ def test_s3_refuses_wrong_credentials_and_a_missing_bucket_in_one_line() -> None
 
 
 class _SomebodysRedis(RedisServer):
-    """A Redis that is there already; only its URL matters."""
+    """An existing Redis; only its URL matters."""
 
     url = ""
 

@@ -22,11 +22,11 @@ def test_an_estimate_grows_with_the_job() -> None:
 def test_a_job_is_the_same_job_in_any_order_and_another_with_another_recipe() -> None:
     houses = [HouseEntry(house_id=h, sha256=h * 8) for h in "abc"]
     preview = new_spec(recipe_from_name("preview"))
-    one = completed(houses, preview)[1].job_id
-    assert completed(houses[::-1], preview)[1].job_id == one
-    assert completed(houses, new_spec(recipe_from_name("fast")))[1].job_id != one
+    job_id = completed(houses, preview)[1].job_id
+    assert completed(houses[::-1], preview)[1].job_id == job_id
+    assert completed(houses, new_spec(recipe_from_name("fast")))[1].job_id != job_id
     changed = [*houses[:2], HouseEntry(house_id="c", sha256="changed")]
-    assert completed(changed, preview)[1].job_id != one
+    assert completed(changed, preview)[1].job_id != job_id
     with pytest.raises(BadInput, match="named twice"):
         completed([*houses, houses[0]], preview)
     with pytest.raises(BadInput, match="no house"):

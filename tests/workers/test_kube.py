@@ -1,8 +1,8 @@
-"""The Kubernetes manifests on a cluster that is there: `make test-kube` (tests/infra/README.md).
+"""The Kubernetes manifests on an existing cluster: `make test-kube` (tests/infra/README.md).
 
-`kubectl` must answer. The tests own the namespace pbrs-farm: they make it, and take it away.
-PBRS_TEST_KUBE_IMAGE, PBRS_TEST_KUBE_REDIS_IMAGE: what the nodes have or can pull.
-PBRS_TEST_KUBE_NEXT_IMAGE: what is rolled out; without it the same image is rolled out anew.
+`kubectl` must answer. The tests own the namespace pbrs-farm: they create and delete it.
+PBRS_TEST_KUBE_IMAGE, PBRS_TEST_KUBE_REDIS_IMAGE: images that the nodes have or can pull.
+PBRS_TEST_KUBE_NEXT_IMAGE: the image to roll out; by default the same image again.
 """
 
 from __future__ import annotations
@@ -28,9 +28,9 @@ pytestmark = pytest.mark.kube
 MANIFESTS: Final = REPO / "deploy/kubernetes"
 NAMESPACE: Final = "pbrs-farm"
 KINDS_OF_KEDA: Final = ("scaledobjects.keda.sh", "triggerauthentications.keda.sh")
-# A room that the program builds itself; light of some seconds a view, so that tasks can be met running.
+# A generated room; light takes some seconds a view, so that tasks can be caught running.
 JOB: Final = ("builtin", "--recipe", "preview", "--size", "160x120", "--set", "light.denoise=false")
-# Nothing but the lab's size: no registry is asked for what a node has, and two cores are enough.
+# Only sizes for the lab: nodes use the images they have, and two cores are enough.
 _PATCHES: Final = """
   - target: {kind: Deployment}
     patch: |
@@ -56,7 +56,7 @@ _OLDER_BUDGETS: Final = """
 
 @dataclass(frozen=True, slots=True)
 class Cluster:
-    """What kubectl reaches, and the overlay that was applied."""
+    """The cluster of kubectl, and the applied overlay."""
 
     overlay: Path
 
@@ -64,31 +64,31 @@ class Cluster:
         return json.loads(kubectl("-n", NAMESPACE, "get", what, *words, "-o", "json"))
 
     def pods(self, name: str) -> list[dict[str, Any]]:
-        """The pods of a Deployment or StatefulSet that are not being ended."""
-        found = self.get("pods", "-l", f"app.kubernetes.io/name={name}")["items"]
-        return [pod for pod in found if "deletionTimestamp" not in pod["metadata"]]
+        """The pods of a Deployment or StatefulSet that are not terminating."""
+        pods = self.get("pods", "-l", f"app.kubernetes.io/name={name}")["items"]
+        return [pod for pod in pods if "deletionTimestamp" not in pod["metadata"]]
 
     def n_restarts(self, name: str) -> int:
         states = [s for pod in self.pods(name) for s in pod["status"].get("containerStatuses", ())]
         return sum(int(s["restartCount"]) for s in states)
 
     def farm(self, *words: str) -> str:
-        """A command of the farm, in the coordinator's pod."""
+        """Output of a farm command in the coordinator's pod."""
         command = ("exec", "deploy/coordinator", "--", "pbrs-farm", *words)
         return kubectl("-n", NAMESPACE, *command)
 
     def status(self, job: str) -> dict[str, Any]:
         command = ("exec", "deploy/coordinator", "--", "pbrs-farm", "status", "--json", job)
         done = _ran("-n", NAMESPACE, *command)
-        found: dict[str, Any] = json.loads(done.stdout) if done.stdout else {"state": done.stderr}
-        return found
+        status: dict[str, Any] = json.loads(done.stdout) if done.stdout else {"state": done.stderr}
+        return status
 
     def submit(self, seed: int, views: int) -> str:
         words = ("--seed", str(seed), "--views", str(views), "--update")
         return self.farm("submit", *JOB, *words).strip().splitlines()[-1]
 
     def workers(self) -> dict[str, str]:
-        """Name -> state."""
+        """Name -> state of the workers."""
         return {row["worker"]: row["state"] for row in json.loads(self.farm("workers", "--json"))}
 
     def alive(self) -> list[str]:
@@ -103,11 +103,11 @@ class Cluster:
             kubectl("-n", NAMESPACE, "rollout", "status", name, "--timeout=300s")
 
     def light_runs(self, job: str) -> None:
-        """Wait until a task that makes light is being done."""
+        """Wait until a light task runs."""
         wait(lambda: _running(self.status(job), "light") > 0, 240, f"light of job {job} runs")
 
     def ends(self, job: str, *, lost: int = 0) -> dict[str, Any]:
-        """Wait for the job's end; nothing may have failed, but for so many attempts at most."""
+        """Wait for the job's end; at most `lost` attempts may have failed."""
         wait(lambda: self.status(job)["state"].startswith("done"), 600, f"job {job} is done")
         status = self.status(job)
         assert status["state"] == "done", status
@@ -119,18 +119,18 @@ class Cluster:
 
 @pytest.fixture(scope="module")
 def cluster(tmp_path_factory: pytest.TempPathFactory) -> Iterator[Cluster]:
-    """The overlay `small` on the cluster, its pods ready."""
+    """The overlay `small` on the cluster with all pods ready."""
     _check()
-    at = Cluster(_overlay(tmp_path_factory.mktemp("kube")))
+    cluster_here = Cluster(_overlay(tmp_path_factory.mktemp("kube")))
     kubectl("create", "namespace", NAMESPACE)
     try:
         values = {f"--from-literal={k}={secrets.token_hex(16)}" for k in _SECRETS}
         kubectl("-n", NAMESPACE, "create", "secret", "generic", "pbrs-farm", *sorted(values))
-        kubectl("apply", "-k", str(at.overlay))
-        at.rolled_out("statefulset/redis", "deployment/coordinator", "deployment/worker")
-        wait(lambda: len(at.alive()) == 1, 120, "a worker registers")
-        _say_what_is_not_tested(at)
-        yield at
+        kubectl("apply", "-k", str(cluster_here.overlay))
+        cluster_here.rolled_out("statefulset/redis", "deployment/coordinator", "deployment/worker")
+        wait(lambda: len(cluster_here.alive()) == 1, 120, "a worker registers")
+        _say_what_is_not_tested(cluster_here)
+        yield cluster_here
     finally:
         if os.environ.get("PBRS_TEST_KUBE_KEEP") != "1":
             _ran("delete", "namespace", NAMESPACE, "--timeout=180s")
@@ -169,7 +169,7 @@ def test_a_job_runs_to_its_end_on_pods(cluster: Cluster) -> None:
     assert cluster.ends(job)["views_done"] == 2
 
 
-def test_a_restarted_redis_keeps_every_key_and_the_job_goes_on(cluster: Cluster) -> None:
+def test_a_restarted_redis_keeps_every_key_and_the_job_continues(cluster: Cluster) -> None:
     job = cluster.submit(2, views=6)
     cluster.light_runs(job)
     jobs = {row["job"] for row in json.loads(cluster.farm("jobs", "--json"))}
@@ -191,11 +191,11 @@ def test_a_worker_s_pod_that_is_killed_loses_nothing(cluster: Cluster) -> None:
     assert name not in cluster.alive()
 
 
-def test_a_drained_worker_stays_drained_until_it_is_asked_back(cluster: Cluster) -> None:
+def test_a_drained_worker_stays_drained_until_undrained(cluster: Cluster) -> None:
     (name,) = cluster.alive()
     cluster.farm("drain", name)
     try:
-        # The container ends and is started again under its name.
+        # The container ends and is restarted under the same name.
         wait(lambda: cluster.workers()[name] == "drained", 300, f"{name} is drained")
         job = cluster.submit(4, views=1)
         time.sleep(10)
@@ -251,7 +251,7 @@ _PARTS: Final = ("redis", "coordinator", "worker")
 
 
 def kubectl(*words: str) -> str:
-    """What kubectl answers; fails with what it says."""
+    """Output of kubectl; fails with its error."""
     done = _ran(*words)
     assert done.returncode == 0, f"kubectl {' '.join(words)}: {done.stderr}"
     return done.stdout
@@ -262,7 +262,7 @@ def _ran(*words: str) -> subprocess.CompletedProcess[str]:
 
 
 def wait(holds: Callable[[], bool], at_most_s: float, what: str) -> None:
-    """Wait until it holds; what: says so."""
+    """Wait until `holds()`; `what` describes it in the failure."""
     end = time.monotonic() + at_most_s
     while not holds():
         assert time.monotonic() < end, f"after {at_most_s:.0f} s not yet: {what}"
@@ -274,12 +274,12 @@ def _running(status: dict[str, Any], stage: str) -> int:
 
 
 def _check() -> None:
-    """Fail with everything that is missing."""
+    """Fail with a list of everything that is missing."""
     if shutil.which("kubectl") is None:
         pytest.fail("make test-kube needs kubectl on the PATH", pytrace=False)
-    asked = _ran("get", "nodes", "-o", "name", "--request-timeout=10s")
-    if asked.returncode != 0:
-        text = f"make test-kube needs a cluster that `kubectl get nodes` reaches (KUBECONFIG): {asked.stderr.strip()}"
+    nodes = _ran("get", "nodes", "-o", "name", "--request-timeout=10s")
+    if nodes.returncode != 0:
+        text = f"make test-kube needs a cluster that `kubectl get nodes` reaches (KUBECONFIG): {nodes.stderr.strip()}"
         pytest.fail(text, pytrace=False)
     missing = [
         f"KEDA's kind {kind} (kubectl apply -f its CRD)"
@@ -299,8 +299,8 @@ def _check() -> None:
 
 
 def _overlay(folder: Path, project: str = "overlays/small") -> Path:
-    """An overlay over one of the project's, with this cluster's images; its folder."""
-    # kustomize takes no folder from elsewhere: both lie side by side.
+    """Write an overlay over one of the project's, with this cluster's images; returns its folder."""
+    # kustomize reads no folder from elsewhere: both are copied side by side.
     shutil.copytree(MANIFESTS, folder / "project", dirs_exist_ok=True)
     named = {"registry.example.org/pbrs-farm": os.environ["PBRS_TEST_KUBE_IMAGE"]}
     named["docker.io/library/redis"] = os.environ.get("PBRS_TEST_KUBE_REDIS_IMAGE", "redis:7.2")
@@ -308,20 +308,20 @@ def _overlay(folder: Path, project: str = "overlays/small") -> Path:
         f"  - {{name: {name}, newName: {image.rpartition(':')[0]}, newTag: {image.rpartition(':')[2]}}}\n"
         for name, image in named.items()
     )
-    # Clusters before 1.21 know disruption budgets under another version alone.
+    # Clusters before 1.21 have disruption budgets only in another version.
     is_older = "policy/v1\n" not in kubectl("api-versions") and project != "overlays/small"
     older = _OLDER_BUDGETS if is_older else ""
-    at = folder / "here"
-    at.mkdir()
-    (at / "kustomization.yaml").write_text(
+    overlay = folder / "here"
+    overlay.mkdir()
+    (overlay / "kustomization.yaml").write_text(
         "apiVersion: kustomize.config.k8s.io/v1beta1\nkind: Kustomization\n"
         f"resources: [../project/{project}]\nimages:\n{images}patches:{_PATCHES}{older}"
     )
-    return at
+    return overlay
 
 
 def _say_what_is_not_tested(at: Cluster) -> None:
-    """Print what this cluster cannot show."""
+    """Print the parts that this cluster cannot test."""
     lacks = []
     if len(json.loads(kubectl("get", "nodes", "-o", "json"))["items"]) < 2:
         lacks.append("one node: no spreading, and a drain leaves its pods waiting")

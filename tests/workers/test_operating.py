@@ -1,4 +1,4 @@
-"""What an operator meets: stores that differ, drains that hold, failures that are told, names unknown."""
+"""An operator's cases: differing stores, lasting drains, reported failures, unknown names."""
 
 from __future__ import annotations
 
@@ -39,30 +39,30 @@ def registry_of(farm: Farm, **changes: object) -> Registry:
 # Stores
 
 
-def test_one_store_has_one_id_whatever_its_url(tmp_path: Path) -> None:
+def test_one_store_has_one_id_under_any_url(tmp_path: Path) -> None:
     store = FolderStore(tmp_path / "a")
     assert known_store_id(store) == ""
     assert store_id(store) == store_id(FolderStore(tmp_path / "x" / ".." / "a")) != ""
     assert store_id(FolderStore(tmp_path / "b")) != store_id(store)
 
 
-def test_submit_is_refused_where_no_worker_has_the_store(farm: Farm) -> None:
+def test_submit_is_refused_if_no_worker_has_the_store(farm: Farm) -> None:
     theirs = {"store_url": "file:///elsewhere", "store_id": "0123"}
     registry_of(farm, worker="w7", **theirs).heartbeat()
     with pytest.raises(BadInput, match=r"no worker uses this store; they use file:///elsewhere"):
         submit(farm)
     assert farm.jobs() == []
-    # Nothing was written into the store that is none of theirs.
+    # No file was written into the other store.
     assert list(farm.store.list()) == []
-    # One worker that has it is enough.
+    # One worker that has the store is enough.
     registry_of(farm, worker="w8", store_id=store_id(farm.store)).heartbeat()
     assert submit(farm).state == "running"
 
 
-def test_what_plugins_workers_lack_is_told_at_submit(
+def test_plugins_missing_on_workers_are_reported_at_submit(
     farm: Farm, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    assert farm.check_plugins(["kitchen of lab 1.0"]) == []  # nobody is there to say anything
+    assert farm.check_plugins(["kitchen of lab 1.0"]) == []  # no worker can report
     registry_of(farm, worker="w7").heartbeat()
     with pytest.raises(BadInput, match=r"no worker has all plugins: w7 lacks kitchen of lab 1\.0"):
         farm.check_plugins(["kitchen of lab 1.0"])
@@ -72,12 +72,12 @@ def test_what_plugins_workers_lack_is_told_at_submit(
     assert farm.check_plugins(["kitchen of lab 1.0"]) == ["w7 lacks kitchen of lab 1.0"]
 
 
-def test_submit_goes_on_where_no_worker_is_there_yet_or_says_its_store(farm: Farm) -> None:
+def test_submit_proceeds_without_workers_and_reports_other_stores(farm: Farm) -> None:
     registry_of(farm, worker="old").heartbeat()
     assert submit(farm).state == "running"
 
 
-def test_a_worker_of_another_store_refuses_the_task_and_says_so(farm: Farm) -> None:
+def test_a_worker_of_another_store_refuses_the_task_with_the_reason(farm: Farm) -> None:
     d = submit(farm)
     (task, *_others) = d.dispatch()
     ledger = RedisLedger(replace(farm.config, store_id="ffff"), farm.ledger.client)
@@ -87,7 +87,7 @@ def test_a_worker_of_another_store_refuses_the_task_and_says_so(farm: Farm) -> N
     assert farm.status(d.job.job_id)["failures"] == {}
 
 
-def test_why_says_that_all_workers_have_another_store(farm: Farm) -> None:
+def test_why_reports_that_all_workers_have_another_store(farm: Farm) -> None:
     d = submit(farm)
     d.dispatch()
     registry_of(farm, store_id="ffff").heartbeat()
@@ -104,7 +104,7 @@ def test_a_drain_outlives_the_worker_that_left(farm: Farm) -> None:
     farm.drain("w1")
     assert registry.heartbeat()
     registry.leave()
-    # The container is started again, under the same name.
+    # The container is restarted under the same name.
     assert registry.is_drained()
     assert registry.heartbeat(takes_work=False)
     assert registry.slots() == {}
@@ -116,7 +116,7 @@ def test_a_drain_outlives_the_worker_that_left(farm: Farm) -> None:
     assert farm.workers()[0]["state"] == "alive"
 
 
-def test_a_worker_that_left_can_be_asked_back_before_it_is_there(farm: Farm) -> None:
+def test_a_drain_of_an_absent_worker_can_be_revoked(farm: Farm) -> None:
     farm.registry.heartbeat()
     farm.drain("w1")
     farm.registry.leave()
@@ -124,7 +124,7 @@ def test_a_worker_that_left_can_be_asked_back_before_it_is_there(farm: Farm) -> 
     assert not farm.registry.is_drained()
 
 
-def test_a_drained_worker_that_is_started_again_waits_until_it_is_asked_back(
+def test_a_restarted_drained_worker_waits_until_undrained(
     farm: Farm, monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
     monkeypatch.setattr(supervisor, "DRAINED_POLL_S", 0.1)
@@ -157,7 +157,7 @@ def test_a_drained_worker_that_is_started_again_waits_until_it_is_asked_back(
     assert answers == [True]
 
 
-def test_a_drained_worker_that_waits_ends_when_it_is_told_to(farm: Farm, tmp_path: Path) -> None:
+def test_a_waiting_drained_worker_ends_at_a_signal(farm: Farm, tmp_path: Path) -> None:
     farm.registry.heartbeat()
     farm.drain("w1")
     orders = supervisor.Orders(leave_at=1.0)
@@ -172,12 +172,12 @@ def test_a_worker_that_leaves_is_seen_without_slots_until_it_is_gone(farm: Farm)
     assert farm.workers()[0]["state"] == "draining"
     assert farm.registry.slots() == {}
     assert farm.ledger.client.zcard(f"{farm.config.prefix}workers:gl") == 0
-    # It is started again under its name.
+    # It is restarted under its name.
     farm.registry.heartbeat()
     assert farm.workers()[0]["state"] == "alive"
 
 
-# A farm that was just set up, and one whose ledger is lost
+# A fresh farm, and one whose ledger is lost
 
 
 def test_status_of_a_fresh_farm_is_no_failure_and_a_lost_ledger_names_the_job(
@@ -200,7 +200,7 @@ def test_status_of_a_fresh_farm_is_no_failure_and_a_lost_ledger_names_the_job(
 # Failures
 
 
-def test_a_job_with_failures_ends_as_such_and_status_ends_with_one(
+def test_a_job_with_failures_ends_with_them_and_status_exits_with_one(
     farm: Farm, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     environment(farm, monkeypatch)
@@ -216,7 +216,7 @@ def test_a_job_with_failures_ends_as_such_and_status_ends_with_one(
         assert main(words) == 1
         assert "done with failures" in capsys.readouterr().out
     assert farm.submit(HOUSES, new_spec(recipe_from_name("preview"))).was == "done with failures"
-    # Retried and done, it is as if nothing had happened.
+    # After a successful retry nothing of the failure remains.
     farm.retry(job)
     d.run_all()
     assert main(["status", job]) == 0
@@ -255,7 +255,7 @@ def test_headlines_keep_their_words(message: str, headline: str) -> None:
 # Workers and names
 
 
-def test_workers_tells_the_dead_from_the_living(farm: Farm) -> None:
+def test_workers_lists_dead_and_live_ones(farm: Farm) -> None:
     farm.registry.heartbeat()
     gone = registry_of(farm, worker="w9")
     gone.heartbeat()
@@ -265,7 +265,7 @@ def test_workers_tells_the_dead_from_the_living(farm: Farm) -> None:
     assert workers_text(farm.workers()).splitlines()[-1] == "1 alive, 1 dead"
 
 
-def test_why_says_that_the_holder_is_silent_and_when_its_lease_ends(farm: Farm) -> None:
+def test_why_reports_a_silent_holder_and_the_end_of_its_lease(farm: Farm) -> None:
     d = submit(farm)
     task = d.dispatch()[0]
     d.claim(task)
@@ -288,14 +288,14 @@ def test_why_says_that_the_holder_is_silent_and_when_its_lease_ends(farm: Farm) 
         ("h0/-/geometry", "no log stored"),
     ],
 )
-def test_logs_says_which_name_is_unknown(farm: Farm, task: str, says: str) -> None:
+def test_logs_names_the_unknown_name(farm: Farm, task: str, says: str) -> None:
     d = submit(farm)
     d.dispatch()
     with pytest.raises(BadInput, match=says):
         farm.logs(d.job.job_id, task)
 
 
-def test_logs_says_which_attempts_have_one(farm: Farm) -> None:
+def test_logs_lists_the_attempts_with_a_log(farm: Farm) -> None:
     d = submit(farm)
     d.dispatch()
     farm.store.put(log_key(d.job.job_id, "h0/-/geometry", 2), b"text")
@@ -310,7 +310,7 @@ def test_drain_offers_the_name_that_is_near(farm: Farm) -> None:
 
 
 class FakeJobs:
-    """What a ledger says of jobs with work: an error where it says nothing."""
+    """Stands in for a ledger's count of jobs with work; raises an error where a script has one."""
 
     def __init__(self) -> None:
         self.jobs: list[str] | None = []
@@ -324,19 +324,19 @@ class FakeJobs:
 def test_a_worker_is_idle_since_no_job_had_work_and_never_while_redis_is_silent() -> None:
     now, ledger = [100.0], FakeJobs()
     idleness = supervisor.Idleness(ledger, clock=lambda: now[0])  # type: ignore[arg-type]
-    told: list[float] = []
+    idle_seconds: list[float] = []
     steps: list[tuple[float, list[str] | None]] = [
         (130.0, []), (135.0, ["j"]), (141.0, ["j"]), (200.0, []), (260.0, None), (280.0, []),
     ]  # fmt: skip
     for now[0], ledger.jobs in steps:
-        told.append(idleness.seconds())
-    # At 135 it does not ask yet: it asked at 130.
-    assert told == [30.0, 35.0, 0.0, 59.0, 0.0, 20.0]
+        idle_seconds.append(idleness.seconds())
+    # At 135 it does not ask yet, as it asked at 130.
+    assert idle_seconds == [30.0, 35.0, 0.0, 59.0, 0.0, 20.0]
 
 
 @pytest.fixture
 def handlers() -> Iterator[None]:
-    """Signals mean afterwards what they did before."""
+    """Restores signal handlers after the test."""
     before = {n: signal.getsignal(n) for n in (signal.SIGTERM, signal.SIGINT, signal.SIGQUIT)}
     yield
     for number, handler in before.items():
@@ -353,7 +353,7 @@ def handlers() -> Iterator[None]:
     ],
     ids=["idle", "preempted", "asked to leave"],
 )
-def test_a_worker_ends_when_it_is_idle_and_says_when_it_was_preempted(
+def test_a_worker_ends_when_idle_and_reports_preemption(
     farm: Farm,
     monkeypatch: pytest.MonkeyPatch,
     tmp_path: Path,
@@ -361,7 +361,7 @@ def test_a_worker_ends_when_it_is_idle_and_says_when_it_was_preempted(
     given: dict[str, Any],
     code: int,
 ) -> None:
-    # In Celery's place: a process that waits until it is told to end.
+    # In place of Celery: a process that waits for a signal to end.
     program = f"import os, signal, time; {says}; time.sleep(60)"
     monkeypatch.setattr(supervisor, "command", lambda _config: [sys.executable, "-c", program])
     monkeypatch.setattr(supervisor, "_POLL_S", 0.02)

@@ -1,4 +1,4 @@
-"""deploy/pilot/worker.sh: a name of its own, a way out by every scheduler's signal, back into the queue."""
+"""deploy/pilot/worker.sh: a unique name, an orderly end on every scheduler's signal, and requeueing."""
 
 from __future__ import annotations
 
@@ -13,8 +13,9 @@ import pytest
 from tests.workers.small_farm import REPO
 
 SCRIPT = REPO / "deploy/pilot/worker.sh"
-# Stands for `pbrs-farm worker`: says how it was started, and leaves a note when it is told to leave. Python as the
-# worker is: a shell that waits for one `sleep` after another loses a signal now and then.
+# Stands in for `pbrs-farm worker`: prints how it was started, and leaves a note at a signal to
+# leave. In Python, like the worker: a shell that runs one `sleep` after another sometimes loses a
+# signal.
 WORKER = f"""#!{sys.executable} -IS
 import os, signal, sys, time
 
@@ -37,19 +38,19 @@ def started(folder: Path, **env: str) -> subprocess.Popen[str]:
     (folder / "bin").chmod(0o755)
     (folder / "env").write_text("PBRS_FARM_REDIS=r\n")
     clean = {k: v for k, v in os.environ.items() if not k.startswith(("PBRS_", "SLURM_"))}
-    own = {
+    environment = {
         "PBRS_ENV_FILE": str(folder / "env"),
         "PBRS_BIN": str(folder / "bin"),
         "TMPDIR": str(folder),
     }
     return subprocess.Popen(
-        ["bash", str(SCRIPT)], env=clean | own | env, stdout=subprocess.PIPE, text=True,
+        ["bash", str(SCRIPT)], env=clean | environment | env, stdout=subprocess.PIPE, text=True,
         preexec_fn=_heed_signals, start_new_session=True,
     )  # fmt: skip
 
 
 def _heed_signals() -> None:
-    # A signal that a test before made this process ignore cannot be trapped by a shell it starts.
+    # A shell cannot trap a signal that this process ignores since an earlier test.
     for number in (signal.SIGTERM, signal.SIGUSR2):
         signal.signal(number, signal.SIG_DFL)
 
@@ -69,8 +70,8 @@ def test_a_worker_is_named_and_sized_by_its_scheduler(
 ) -> None:
     pool = {"PBRS_POOL": "gpu", "PBRS_WALL_S": "600", "PBRS_TEST_OVER": "1"}
     out, _ = started(tmp_path, **env, **pool).communicate(timeout=20)
-    said = out.splitlines()[1]
-    assert said == f"{name} {slots} 110 light.gpu worker --until 600"
+    line = out.splitlines()[1]
+    assert line == f"{name} {slots} 110 light.gpu worker --until 600"
 
 
 @pytest.mark.parametrize(
@@ -81,14 +82,14 @@ def test_a_worker_is_named_and_sized_by_its_scheduler(
         ({"PBS_JOBID": "31.host"}, signal.SIGTERM, 0),
     ],
 )
-def test_whatever_a_scheduler_sends_makes_it_leave_and_asks_for_another_turn(
+def test_every_scheduler_signal_makes_it_leave_and_requeue(
     tmp_path: Path, env: dict[str, str], number: signal.Signals, code: int
 ) -> None:
     process = started(tmp_path, **env)
     assert process.stdout is not None
     process.stdout.readline()
     process.stdout.readline()  # the worker runs
-    # GridEngine warns all that runs, others the script alone.
+    # GridEngine warns all processes, others only the script.
     if number == signal.SIGUSR2:
         os.killpg(process.pid, number)
     else:
@@ -99,7 +100,7 @@ def test_whatever_a_scheduler_sends_makes_it_leave_and_asks_for_another_turn(
     assert not list(tmp_path.glob("pbrs-*"))
 
 
-def test_without_its_file_of_settings_it_says_so(tmp_path: Path) -> None:
+def test_a_missing_settings_file_is_reported(tmp_path: Path) -> None:
     done = subprocess.run(
         ["bash", str(SCRIPT)], env={"PBRS_ENV_FILE": str(tmp_path / "none"), "PATH": os.environ["PATH"]},
         capture_output=True, text=True, check=False,

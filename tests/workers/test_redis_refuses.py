@@ -1,4 +1,4 @@
-"""A Redis that refuses for a while, or drops connections, is a Redis that is away: one line, and it goes on."""
+"""A Redis that refuses for a while, or drops connections, counts as away: one log line, then work resumes."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def farm_config(server: RedisServer) -> FarmConfig:
 
 @pytest.fixture
 def ledger(farm_config: FarmConfig) -> Iterator[RedisLedger]:
-    """A ledger that tells at once, where a farm's tries for some seconds."""
+    """A ledger that fails immediately, while a farm's retries for some seconds."""
     ledger = RedisLedger(farm_config)
     ledger.client.set_retry(AT_ONCE)
     yield ledger
@@ -61,7 +61,7 @@ def ledger(farm_config: FarmConfig) -> Iterator[RedisLedger]:
     "EXECABORT Transaction discarded because of: READONLY You can't write against a read only replica.",
     *(f"{prefix} some words" for prefix in PASSING),
 ])  # fmt: skip
-def test_every_refusal_that_passes_is_known_by_its_prefix(line: str) -> None:
+def test_every_temporary_refusal_is_recognised_by_its_prefix(line: str) -> None:
     prefix = passing_prefix(BaseParser.parse_error(line))
     assert prefix in PASSING
     assert prefix in line
@@ -73,12 +73,12 @@ def test_every_refusal_that_passes_is_known_by_its_prefix(line: str) -> None:
     "NOSCRIPT No matching script.", "NOAUTH Authentication required.", "NOPERM User has no permissions",
     "MOVED 1 127.0.0.1:1", "ERR the READONLY word", "",
 ])  # fmt: skip
-def test_what_stays_wrong_is_no_refusal_that_passes(line: str) -> None:
+def test_a_permanent_error_is_no_passing_refusal(line: str) -> None:
     assert passing_prefix(BaseParser.parse_error(line)) == ""
 
 
 @pytest.mark.parametrize("prefix", REFUSALS)
-def test_a_refusal_is_one_line_of_a_ledger_that_is_away_and_passes(
+def test_a_refusal_is_one_line_of_an_absent_ledger_and_passes(
     prefix: str, server: RedisServer, ledger: RedisLedger
 ) -> None:
     job = drive(ledger, 1).job.job_id
@@ -115,7 +115,7 @@ def test_a_worker_does_not_connect_to_a_broker_that_takes_no_writes(
     with app.connection_for_read() as broker:
         broker.connect()
         assert broker.connected
-    # What was written to learn it lives for a millisecond.
+    # The key written by the probe lives for a millisecond.
     give_up = time.monotonic() + 10
     while list(server.client.scan_iter()) and time.monotonic() < give_up:
         time.sleep(0.01)
@@ -131,7 +131,7 @@ def test_a_replica_without_its_master_that_gives_no_stale_data_is_away_to_reader
     assert ledger.active_jobs() == []
 
 
-def test_a_blocking_read_ends_where_its_server_becomes_a_replica(
+def test_a_blocking_read_ends_if_its_server_becomes_a_replica(
     server: RedisServer, ledger: RedisLedger
 ) -> None:
     lead = threading.Timer(0.3, server.client.replicaof, ("127.0.0.1", "1"))
@@ -141,7 +141,7 @@ def test_a_blocking_read_ends_where_its_server_becomes_a_replica(
     lead.join()
 
 
-def test_the_ledger_tries_anew_by_a_new_connection(
+def test_the_ledger_retries_on_a_new_connection(
     server: RedisServer, farm_config: FarmConfig
 ) -> None:
     client = redis_client(farm_config)
@@ -168,7 +168,7 @@ def test_dropped_connections_lose_no_call_of_the_ledger_and_no_message(
         try:
             send([MESSAGE])
             n_sent += 1
-        except LedgerUnavailable:  # what is not sent stays with the ledger
+        except LedgerUnavailable:  # unsent tasks stay in the ledger
             pass
         send([MESSAGE])
         n_sent += 1
@@ -209,16 +209,16 @@ def test_a_heartbeat_does_not_hold_up_a_worker_while_redis_stalls(
     with StallingProxy(server.port) as proxy:
         monkeypatch.setenv("PBRS_REDIS_URL", f"{proxy.url}?socket_timeout=0.2")
         step = Heartbeat(None)
-        step._heartbeat()
+        step.beat()
         assert server.client.zcard("pbrs:workers") == 1
         # One timeout and no second try: the probe waits for 120 s.
         n_connections = proxy.n_connections
         proxy.stall(also_new=True)
-        step._heartbeat()
+        step.beat()
         assert proxy.n_connections == n_connections
 
 
-def test_one_timeout_is_enough_where_all_connections_are_silent(
+def test_one_timeout_is_enough_if_all_connections_are_silent(
     server: RedisServer, farm_config: FarmConfig
 ) -> None:
     with StallingProxy(server.port) as proxy:

@@ -1,4 +1,4 @@
-"""A Redis of each set-up that we ship keeps what it acknowledged when it is started again."""
+"""A Redis of each deployment that we ship keeps acknowledged writes across a restart."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ Connect = Callable[[], redis.Redis]
 
 
 def of_kubernetes(folder: Path, port: int) -> list[str]:
-    """The command of the manifest's own ConfigMap, with its paths in a folder."""
+    """The command of the manifest's ConfigMap, with its paths in a folder."""
     text = (REPO / "deploy/kubernetes/base/settings.yaml").read_text(encoding="utf-8")
     (files,) = (d["data"] for d in yaml.safe_load_all(text) if d["metadata"]["name"] == "redis")
     for name, content in files.items():
@@ -70,7 +70,7 @@ def running(command: list[str], connect: Connect) -> Iterator[subprocess.Popen[b
 
 
 def write_until_it_ends(client: redis.Redis, acknowledged: set[str]) -> None:
-    """Transactions and scripts, as the ledger and Celery write them, while the server answers."""
+    """Transactions and scripts, like those of the ledger and Celery, while the server answers."""
     for n in range(100_000):
         try:
             with client.pipeline(transaction=True) as pipe:
@@ -87,7 +87,9 @@ def write_until_it_ends(client: redis.Redis, acknowledged: set[str]) -> None:
 
 @pytest.mark.skipif(shutil.which("redis-server") is None, reason="needs redis-server")
 @pytest.mark.parametrize("name", SET_UPS)
-def test_a_restart_under_load_loses_no_key_and_lets_nobody_in(name: str, tmp_path: Path) -> None:
+def test_a_restart_under_load_loses_no_key_and_admits_no_stranger(
+    name: str, tmp_path: Path
+) -> None:
     make, user = SET_UPS[name]
     for secret in ("redis_password", "keda_password"):
         (tmp_path / secret).write_text(f"{secret} of a test".replace(" ", "-"))
@@ -109,9 +111,9 @@ def test_a_restart_under_load_loses_no_key_and_lets_nobody_in(name: str, tmp_pat
         server.wait(10)
         load.join()
     with running(command, connect):
-        kept = set(connect().scan_iter(count=10_000))
+        keys = set(connect().scan_iter(count=10_000))
         assert len(acknowledged) > 30
-        assert acknowledged - kept == set()
+        assert acknowledged - keys == set()
         for password in (None, "guessed"):
             stranger = redis.Redis(port=port, password=password, retry=AT_ONCE)
             with pytest.raises(redis.AuthenticationError):

@@ -1,4 +1,4 @@
-"""A job with a reference ends with its selection, the same one a local `select` writes."""
+"""A job with a reference ends with its selection, equal to that of a local `select`."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from workers.runner import TaskRequest
 KEY = "jobs/sources/references/r.npz"
 
 
-def test_a_job_with_a_reference_selects_and_says_which_house_is_missing() -> None:
+def test_a_job_with_a_reference_selects_and_names_the_missing_house() -> None:
     store = MemoryStore()
     put_house(store, "a", 4)
     put_house(store, "b", 3)

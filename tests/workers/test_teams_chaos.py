@@ -14,7 +14,7 @@ pytestmark = pytest.mark.chaos
 
 
 def holders(farm: SmallFarm, job: str) -> set[str]:
-    """The slots that hold tasks of a job now."""
+    """The slots that hold tasks of a job."""
     return {hold.token for hold in farm.farm.ledger.holds(job)}
 
 
@@ -49,7 +49,7 @@ def test_an_urgent_job_takes_the_slots_of_running_tasks_which_count_no_failure(
     urgent = farm.submit(2, "u", preempt=True)
     farm.wait_done(40)
     seconds = time.monotonic() - began
-    assert seconds < 30  # a task of the calm job would have held its slot for a minute
+    assert seconds < 30  # a task of the normal job would have held its slot for a minute
     view = farm.farm.view(calm)
     assert view.counts["handed_back:preempted"] >= 2
     wait_all(farm, calm, urgent)
@@ -63,7 +63,7 @@ def test_a_budget_pauses_a_job_under_load_and_more_of_it_ends_the_job(farm: Smal
     assert "budget" in farm.farm.view(job).fields["reason"]
     farm.wait(lambda: farm.running() == 0, 20, "what ran has ended")
     spent_s = 3600 * farm.farm.view(job).spent_h
-    # A slot tells what is done each five seconds, and ends the tasks it has claimed.
+    # A slot reports finished tasks each five seconds, and ends its claimed tasks.
     assert 3 <= spent_s < 12
     n = sum(farm.starts().values())
     time.sleep(2)
@@ -74,9 +74,7 @@ def test_a_budget_pauses_a_job_under_load_and_more_of_it_ends_the_job(farm: Smal
     note("a budget, then more of it", farm, farm.check_complete(n_repeats=0), 0.0)
 
 
-def test_quotas_of_slots_and_slot_hours_hold_a_user_s_jobs_back_and_nobody_else_s(
-    farm: SmallFarm,
-) -> None:
+def test_quotas_of_slots_and_slot_hours_hold_back_only_their_user(farm: SmallFarm) -> None:
     root = add_user(farm.farm, "root", {})
     admin = farm.farm.acting_as(farm.farm.users.all()["root"], "here")
     ann = add_user(admin, "ann", {"max_slots": 1, "slot_hours": 4 / 3600})
@@ -106,7 +104,7 @@ def test_quotas_of_slots_and_slot_hours_hold_a_user_s_jobs_back_and_nobody_else_
     assert root not in repr(farm.farm.users.all())
 
 
-def test_a_user_who_comes_late_has_his_share_of_the_slots_at_once(farm: SmallFarm) -> None:
+def test_a_late_user_gets_his_share_of_the_slots(farm: SmallFarm) -> None:
     add_user(farm.farm, "root", {})
     admin = farm.farm.acting_as(farm.farm.users.all()["root"], "here")
     ann, bob = (add_user(admin, name, {}) for name in ("ann", "bob"))
@@ -119,7 +117,7 @@ def test_a_user_who_comes_late_has_his_share_of_the_slots_at_once(farm: SmallFar
     first_s = time.monotonic() - began
     n_before = farm.starts().total()
     farm.wait(lambda: farm.farm.view(his).state == "done", 90, "bob's job is done")
-    # Until his last view has begun: the merges after it hold no slot, and leave both of them to ann.
+    # Until his last view has begun: the later merges hold no slot, and leave both to ann.
     starts = (farm.control / "starts").read_text().splitlines()[n_before:]
     users = "".join(task[0] for task in starts if task[0] in "ab").rpartition("b")
     share = (users[0].count("b") + 1) / (len(users[0]) + 1)

@@ -1,4 +1,4 @@
-"""A recipe that was replaced: markers of the former one do not count as done."""
+"""A replaced recipe: markers of the former one do not count as done."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ __all__ = ["farm"]  # a fixture
 
 
 def finish_all(farm: Farm) -> None:
-    """Every marker and manifest that the houses can have."""
+    """Write every marker and manifest of the houses."""
     for house in HOUSES:
         name = house.house_id
         views = [view for batch in batches_of(name) for view in batch]
@@ -38,7 +38,7 @@ def done_and_waiting(farm: Farm, job: str) -> tuple[int, int]:
     return int(view.counts.get("houses:done", 0)), view.n_waiting_houses
 
 
-def test_every_house_begins_anew_and_does_so_after_a_recovery_too(farm: Farm) -> None:
+def test_every_house_begins_again_also_after_a_recovery(farm: Farm) -> None:
     finish_all(farm)
     first = farm.submit(HOUSES, new_spec(recipe_from_name("preview"))).job_id
     assert done_and_waiting(farm, first) == (3, 0)
@@ -48,16 +48,16 @@ def test_every_house_begins_anew_and_does_so_after_a_recovery_too(farm: Farm) ->
     assert done_and_waiting(farm, second) == (0, 3)
 
 
-def test_a_job_of_another_version_goes_on_once_it_is_adopted(farm: Farm) -> None:
+def test_a_job_of_another_version_continues_once_it_is_adopted(farm: Farm) -> None:
     job = farm.submit(HOUSES, new_spec(recipe_from_name("preview"))).job_id
-    made = farm.spec(job)
-    # As another version submitted it: what it stored is made again by this one.
+    old_spec = farm.spec(job)
+    # As if submitted by another version: its stored files are rebuilt by this one.
     finish_all(farm)
-    old = made.model_copy(update={"version": "0.0.9"})
+    old = old_spec.model_copy(update={"version": "0.0.9"})
     farm.store.put(job_key(job), old.model_dump_json().encode())
     farm.recover(job)
     (task,) = Drive(farm.ledger, old).dispatch()[:1]
-    claim = farm.ledger.claim(job, task, token="t", recipe=made.recipe.digest())
+    claim = farm.ledger.claim(job, task, token="t", recipe=old_spec.recipe.digest())
     assert claim.verdict == "version"
     for _ in range(2):
         farm.adopt(job)
@@ -65,7 +65,7 @@ def test_a_job_of_another_version_goes_on_once_it_is_adopted(farm: Farm) -> None
         assert done_and_waiting(farm, job) == (0, 3)
     d = Drive(farm.ledger, farm.spec(job))
     (task, *_) = d.dispatch()
-    assert farm.ledger.claim(job, task, token="t", recipe=made.recipe.digest()).verdict == "run"
+    assert farm.ledger.claim(job, task, token="t", recipe=old_spec.recipe.digest()).verdict == "run"
 
 
 def test_the_version_of_a_job_follows_the_steps_and_not_the_package(
@@ -85,6 +85,6 @@ def test_the_version_of_a_job_follows_the_steps_and_not_the_package(
 def test_markers_of_another_version_do_not_count_either(farm: Farm) -> None:
     finish_all(farm)
     spec = new_spec(recipe_from_name("preview"))
-    other = spec.model_copy(update={"version": "0.0.9", "job_id": "0123456789ab"})
-    farm.store.put(job_key("0123456789ab"), other.model_dump_json().encode())
+    old_version = spec.model_copy(update={"version": "0.0.9", "job_id": "0123456789ab"})
+    farm.store.put(job_key("0123456789ab"), old_version.model_dump_json().encode())
     assert done_and_waiting(farm, farm.submit(HOUSES, spec).job_id) == (0, 3)

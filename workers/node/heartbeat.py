@@ -32,8 +32,8 @@ class Heartbeat(bootsteps.StartStopStep):  # type: ignore[misc]
         self._timer: Any = None
 
     def start(self, parent: Any) -> None:
-        self._heartbeat()
-        self._timer = parent.timer.call_repeatedly(_EVERY_S, self._heartbeat)
+        self.beat()
+        self._timer = parent.timer.call_repeatedly(_EVERY_S, self.beat)
 
     def stop(self, _parent: Any) -> None:
         if self._timer is not None:
@@ -41,9 +41,9 @@ class Heartbeat(bootsteps.StartStopStep):  # type: ignore[misc]
         # Running tasks are finished first: from here on the supervisor sends this worker's
         # heartbeat.
         touch(self._config.leaving_file)
-        self._heartbeat()
+        self.beat()
 
-    def _heartbeat(self) -> None:
+    def beat(self) -> None:
         touch(self._config.heartbeat_file)
         is_leaving = self._config.leaving_file.exists()
         try:

@@ -15,7 +15,7 @@ RUN = "pbrs.run"
 
 
 @cache
-def _slot() -> Slot:
+def current_slot() -> Slot:
     """This pool process's slot, never of Celery's parent."""
     return make_slot(config_from_environment())
 
@@ -23,7 +23,7 @@ def _slot() -> Slot:
 @worker_process_init.connect  # type: ignore[untyped-decorator]
 def _make_ready(**_: object) -> None:
     """A pool process has its slot before its first task."""
-    _slot()
+    current_slot()
 
 
 @app.task(name=RUN)  # type: ignore[untyped-decorator]
@@ -32,4 +32,4 @@ def run(job: str, task: str, recipe: str) -> None:
 
     task: HOUSE/UNIT/STAGE, or several units of them: HOUSE/UNIT,UNIT/STAGE.
     """
-    _slot().run_tasks(check_job_id(job), tasks_from_group(task), recipe)
+    current_slot().run_tasks(check_job_id(job), tasks_from_group(task), recipe)

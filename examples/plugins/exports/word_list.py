@@ -1,4 +1,4 @@
-"""A form of export: a line of words a view, from the scene itself.
+"""A form of export: one line of words per view, from the scene itself.
 
 pbrs-farm export out/studio --to word_list --most 5
 """

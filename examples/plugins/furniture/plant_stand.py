@@ -1,4 +1,4 @@
-"""Furniture of one's own: plant stands of wood or metal, some with a pot on top.
+"""Custom furniture: plant stands of wood or metal, some with a pot on top.
 
 pbrs-farm run Studio --dress 3 --catalogue generated --out out/stands
 """

@@ -1,4 +1,4 @@
-"""A scene family: a generated home with a few boxes on its tables, by a seed.
+"""A scene family: a generated home with a few boxes on its tables, drawn by a seed.
 
 pbrs-farm run plugin:still_life,1..10 --out out/still
 """

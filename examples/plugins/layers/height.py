@@ -1,4 +1,4 @@
-"""A label layer of one's own: height above the floor of the house's lowest level, millimetres.
+"""A custom label layer: height above the floor of the house's lowest level, millimetres.
 
 pbrs-farm run builtin --layers height --out out/height
 """
@@ -13,7 +13,7 @@ from pbrs_farm.plugin import optional_layer
 
 
 class Height:
-    """What the entry point names: an object with a layer and a function that makes it."""
+    """Target of the entry point: an object with a layer and a function that computes it."""
 
     layer = optional_layer("height", "Y", "uint16", "mm above the lowest floor")
 

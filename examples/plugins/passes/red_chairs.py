@@ -1,4 +1,4 @@
-"""A pass of dressing of one's own: chairs in red lacquer.
+"""A custom pass of dressing: chairs in red lacquer.
 
 pbrs-farm run Studio --dress 3 --set dress.passes=red_chairs --out out/red
 """

@@ -1,4 +1,4 @@
-"""A reader of one's own format: a .room file, JSON with the size of a box-shaped room.
+"""A reader of a custom format: a .room file, JSON with the size of a box-shaped room.
 
 {"width": 4, "depth": 3, "height": 2.5}
 """
@@ -29,7 +29,7 @@ from pbrs_farm.plugin import (
 
 
 def read_room(given: GivenFile, _fields: ReadFields) -> House:
-    """The house; BadHouse, naming file and place, where it cannot be read."""
+    """The house; raises BadHouse with file and place if the file is invalid."""
     path = given.path
     try:
         size = json.loads(path.read_text())
@@ -62,7 +62,7 @@ def _item(name: str, kind: ItemKind, label: str, box: Any) -> Item:
     return Item(name, name, kind, "0", (surface,), nyu40=NYU40_NAMES.index(label), room_id=room)
 
 
-# What the entry point names: the same entry that each format of pbrs_farm ends with.
+# Target of the entry point, of the same type as the entry at the end of each format of pbrs_farm.
 FORMAT = Format(
     kind="room", title="Room", files=".room", brings="a box-shaped room and a table",
     where="written by hand", licence="yours", suffixes=(".room",), read=read_room,

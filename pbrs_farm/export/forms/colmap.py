@@ -37,7 +37,7 @@ def write_colmap(views: list[ChosenView], out: Path, _choice: Choice) -> None:
             picture = required_picture(view, "colmap")
             (out / house / "images" / f"{view.id}.png").write_bytes(view.data(picture))
             # Each camera of a rig is a sensor, even if two are alike.
-            key = view.shot.eye, _camera_line(view)
+            key = view.shot.eye, colmap_camera_line(view)
             camera = cameras.setdefault(key, len(cameras) + 1)
             sensors.append(camera)
             pixels, lines = _points_of(view, picture)
@@ -91,7 +91,7 @@ def _write_lines(file: Path, lines: Iterable[str]) -> None:
     file.write_text("".join(lines), "utf-8")
 
 
-def _camera_line(view: ChosenView) -> str:
+def colmap_camera_line(view: ChosenView) -> str:
     require_lens(view, "colmap", "radtan", "fisheye")
     i = intrinsics_of(view.facts)
     # FULL_OPENCV has k1 k2 p1 p2 k3 and three more, which are 0.

@@ -183,7 +183,7 @@ def _parameters(scene: str, view: ChosenView) -> dict[str, Any]:
 
 def _frame(view: ChosenView) -> dict[tuple[str, str], NDArray[Any] | bytes]:
     """(folder, name) -> the content of a frame's file: an array for HDF5, or a JPEG."""
-    light, geometry = _light(view), _geometry(view)
+    light, geometry = light_layers(view), _geometry(view)
     files: dict[tuple[str, str], NDArray[Any] | bytes] = {}
     for name, array in light.items():
         files["final_hdf5", f"{name}.hdf5"] = array
@@ -237,7 +237,7 @@ def _in_world(local: F32, pose: F64, turn: F64) -> F32:
     return np.asarray(local @ (turn @ opengl).T, np.float32)
 
 
-def _light(view: ChosenView) -> dict[str, NDArray[np.float16]]:
+def light_layers(view: ChosenView) -> dict[str, NDArray[np.float16]]:
     """color and the available intrinsic layers; with all of them, color == reflectance x illumination + residual.
 
     No residual is negative (`intrinsic_parts`).

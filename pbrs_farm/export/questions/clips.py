@@ -257,13 +257,13 @@ def clips_of(views: Sequence[ChosenView]) -> Iterator[Clip]:
         house = stored_house(firsts[0].entry.folder.parent.parent)
         walk = [view for view in firsts if view.facts.get("frame") is not None]
         if len(walk) > 1:
-            yield _clip(house_id, walk, house)
+            yield clip_of_views(house_id, walk, house)
         for view in firsts:
             if len(walk) < 2 or view.facts.get("frame") is None:
-                yield _clip(f"{house_id}__{view.id}", [view], house)
+                yield clip_of_views(f"{house_id}__{view.id}", [view], house)
 
 
-def _clip(name: str, views: Sequence[ChosenView], house: House) -> Clip:
+def clip_of_views(name: str, views: Sequence[ChosenView], house: House) -> Clip:
     items = {item.id: item for item in house.items}
     things: dict[int, Thing] = {}
     for k, view in enumerate(views):

@@ -84,7 +84,7 @@ class _PieceGroup(_ForSome):
     chance: float = 1.0
 
 
-class _Brief(Record):
+class BriefTable(Record):
     groups: tuple[_PieceGroup, ...]
     fillers: tuple[_PieceGroup, ...] = ()
     density: float = 0.0
@@ -99,7 +99,7 @@ _FOR_SIX_M2, _FOR_EIGHT_M2 = 16.0, 24.0  # rooms that have a table for so many
 _LARGE_TABLES: Final = 0.65  # share of rooms whose table is as large as they let it
 _CHILDS_ROOM: Final = "childs_room"
 _BRIEFS: Final = read_toml(
-    Path(__file__).with_name("briefs.toml"), dict[RoomType | UseWithoutType, _Brief]
+    Path(__file__).with_name("briefs.toml"), dict[RoomType | UseWithoutType, BriefTable]
 )
 
 

@@ -68,7 +68,7 @@ class _OpeningRow(Record):
     top: float
 
 
-class _Home(Record):
+class BuiltinTable(Record):
     # The file builtin.toml.
     materials: tuple[Material, ...]
     pieces: dict[str, BuiltinPiece]
@@ -76,7 +76,7 @@ class _Home(Record):
     holes: tuple[_OpeningRow, ...]
 
     @model_validator(mode="after")
-    def _is_there(self) -> _Home:
+    def _is_there(self) -> BuiltinTable:
         materials = {m.name for m in self.materials}
         for name, piece in self.pieces.items():
             if unknown := piece.materials - materials:
@@ -86,7 +86,7 @@ class _Home(Record):
         return self
 
 
-_FILE: Final = read_toml(Path(__file__).with_name("builtin.toml"), _Home)
+_FILE: Final = read_toml(Path(__file__).with_name("builtin.toml"), BuiltinTable)
 
 
 def builtin_home() -> House:

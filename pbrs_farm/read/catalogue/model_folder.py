@@ -77,7 +77,7 @@ def model_folder(
     index = _read_index(stored) if stored is not None else None
     if index is None:
         own_notes = LibraryNotes()
-        pieces = tuple(_index(path, own_notes))
+        pieces = tuple(index_models(path, own_notes))
         index = _digest_of_folder(files), pieces, tuple(own_notes.found)
         if stored is not None:
             _write_index(stored, *index)
@@ -87,7 +87,7 @@ def model_folder(
     return digest, tuple(_piece_of_model(path, piece, notes) for piece in pieces)
 
 
-def _index(path: Path, notes: LibraryNotes) -> list[_Indexed]:
+def index_models(path: Path, notes: LibraryNotes) -> list[_Indexed]:
     table = model_table(path, notes)
     entries = []
     for model in _models(path, table):

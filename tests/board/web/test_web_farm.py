@@ -1,4 +1,4 @@
-"""The farm's pages follow a real farm, one of whose workers is killed, and steer it."""
+"""The farm's pages follow and steer a real farm, one of whose workers is killed."""
 
 from __future__ import annotations
 
@@ -35,7 +35,7 @@ def test_a_job_is_watched_through_a_killed_worker_paused_and_done(
             tab.fill("input[name=token]", TOKEN)
             tab.click("button.main")
             tab.goto(f"{base}/farm")
-            # Both workers and what they run appear by themselves.
+            # Both workers and their tasks appear without a reload.
             until(
                 tab,
                 "document.getElementById('farm').textContent.match(/w1/)"
@@ -45,7 +45,7 @@ def test_a_job_is_watched_through_a_killed_worker_paused_and_done(
             assert tab.inner_text("#live") == "live"
             farm.kill("w1")
             tab.click(f"text={farm.job}")
-            # Pause by two clicks; the page says so, and the ledger does.
+            # Pause with two clicks: page and ledger agree.
             tab.click("text=Pause")
             tab.click("text=Yes, pause")
             tab.wait_for_selector(".state.paused")
@@ -62,6 +62,6 @@ def test_a_job_is_watched_through_a_killed_worker_paused_and_done(
             farm.wait_done()
             tab.goto(f"{base}/farm")
             assert "pause" in tab.inner_text("body")
-            tab.goto("about:blank")  # the stream ends here, not with the server
+            tab.goto("about:blank")  # ends the stream here instead of with the server
     finally:
         farm.close()

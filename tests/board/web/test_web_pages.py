@@ -1,4 +1,4 @@
-"""Each page works in a real browser: its filters, sliders and buttons do what they say."""
+"""Filters, sliders and buttons of each page work in a real browser."""
 
 from __future__ import annotations
 
@@ -102,7 +102,7 @@ def test_overlays_boxes_and_opacity_show(tab: Any, base: str) -> None:
     assert tab.locator("#stage rect:visible").count() == 1
 
 
-def test_the_probe_tells_class_instance_metres_and_normal(tab: Any, base: str) -> None:
+def test_the_probe_shows_class_instance_metres_and_normal(tab: Any, base: str) -> None:
     tab.goto(base + VIEW, wait_until="networkidle")
     stage = tab.locator("#stage").bounding_box()
     # The pixel in the middle of row 30 is the chair, 1.3 m away.
@@ -123,7 +123,7 @@ def test_the_probe_is_moved_by_the_keyboard(tab: Any, base: str) -> None:
     until(
         tab, f"document.getElementById('probe').textContent.includes('{WIDTH // 2}, {HEIGHT // 2}')"
     )
-    # Ten right, past the edge by as much, and one up: the chair's upper row is HEIGHT / 2.
+    # Ten to the right, far past the edge, and one up: the chair's upper row is HEIGHT / 2.
     for key in ["Shift+ArrowRight"] * 3 + ["ArrowUp"]:
         tab.keyboard.press(key)
     text = tab.inner_text("#probe")
@@ -146,7 +146,7 @@ def test_the_probe_is_moved_by_the_keyboard(tab: Any, base: str) -> None:
     assert not tab.is_visible(".pixel-mark")
 
 
-def test_relighting_says_what_it_does_until_it_is_there(tab: Any, base: str) -> None:
+def test_relighting_reports_its_progress(tab: Any, base: str) -> None:
     tab.route("**/light?*", lambda route: (tab.wait_for_timeout(1500), route.continue_()))
     tab.goto(base + VIEW + "/relight")
     until(
@@ -156,7 +156,7 @@ def test_relighting_says_what_it_does_until_it_is_there(tab: Any, base: str) -> 
     assert tab.inner_text("#status") == ""
 
 
-def test_a_page_of_a_root_that_is_read_shows_what_came_by_itself(tab: Any, base: str) -> None:
+def test_a_page_of_a_root_being_read_updates_without_a_reload(tab: Any, base: str) -> None:
     texts = ["Reading homes: 3 of 9."]
     page = httpx.get(base + "/").text
     strip = '<p class="strip" id="reading" role="status">Looking for homes</p></header>'
@@ -276,7 +276,7 @@ def test_no_page_is_wider_than_its_screen(
     page.close()
 
 
-def test_who_shows_the_token_may_log_out(tab: Any, root: Path, tmp_path: Path) -> None:
+def test_a_session_with_the_token_may_log_out(tab: Any, root: Path, tmp_path: Path) -> None:
     with served(str(root), tmp_path, host="0.0.0.0") as client:
         base = str(client.base_url).rstrip("/")
         tab.goto(base)

@@ -1,4 +1,4 @@
-"""Every lens model goes from pixel to direction and back, and says where it has no ray."""
+"""Every lens model maps from pixel to direction and back, and marks pixels without a ray."""
 
 from __future__ import annotations
 
@@ -52,14 +52,14 @@ def test_only_a_fisheye_has_pixels_without_a_ray(name: str) -> None:
         assert blind is None
         assert camera.exact_rays()[1].any(-1).all()
         return
-    # The picture's corners lie beyond the image circle, its middle within.
+    # The picture's corners are outside the image circle, its middle inside.
     assert blind is not None
     assert blind[0, 0]
     assert not blind[256, 256]
     assert not camera.rays()[1][blind].any()
 
 
-def test_a_circle_of_180_degrees_covers_what_a_circle_covers() -> None:
+def test_a_circle_of_180_degrees_covers_a_hemisphere() -> None:
     blind = camera_of("fisheye180").blind
     assert blind is not None
     assert 1 - blind.mean() == pytest.approx(math.pi / 4, abs=0.002)
@@ -77,12 +77,12 @@ def test_the_faces_of_a_cube_map_meet_at_their_edges() -> None:
     i = MODELS["cubemap"].intrinsics(PINHOLE)
     edge = np.linspace(1, 255, 9)
     tiny = 1e-7
-    # From face to face along the strip, and round from left to front.
+    # Between faces along the strip, and around from left to front.
     for left, right in ((255, 257), (511, 513), (767, 769)):
         a = i.directions(np.stack([np.full(9, left + 1 - tiny), edge], 1))
         b = i.directions(np.stack([np.full(9, right - 1 + tiny), edge], 1))
         assert np.allclose(a, b, atol=1e-6)
-    # The lower edge of `up` and the upper edge of `down` are those of the front.
+    # The lower edge of `up` and the upper edge of `down` coincide with the front's.
     front_top = i.directions(np.stack([edge, np.full(9, tiny)], 1))
     up_bottom = i.directions(np.stack([4 * 256 + edge, np.full(9, 256 - tiny)], 1))
     front_bottom = i.directions(np.stack([edge, np.full(9, 256 - tiny)], 1))
@@ -92,7 +92,7 @@ def test_the_faces_of_a_cube_map_meet_at_their_edges() -> None:
 
 
 def test_a_barrel_bends_lines_outwards_in_the_middle_and_a_pin_hole_does_not() -> None:
-    # A straight horizontal edge above the axis: its ends are drawn towards the middle.
+    # A straight horizontal edge above the axis: its ends are bent towards the middle.
     xs = np.linspace(-0.5, 0.5, 5)
     line = np.stack([xs, np.full(5, -0.3), np.ones(5)], 1)
     barrel = Lens("radtan", (-0.2, 0.0, 0.0, 0.0, 0.0)).plane_points(line)
@@ -109,7 +109,9 @@ def test_a_barrel_bends_lines_outwards_in_the_middle_and_a_pin_hole_does_not() -
         ({"model": "fisheye"}, "needs lens.fx"),
     ],
 )
-def test_a_distortion_that_folds_the_picture_is_told(fields: dict[str, float], words: str) -> None:
+def test_a_distortion_that_folds_the_picture_is_refused(
+    fields: dict[str, float], words: str
+) -> None:
     with pytest.raises(ValueError, match=words):
         LensFields(**fields).intrinsics(PINHOLE)  # type: ignore[arg-type]
 
@@ -125,25 +127,26 @@ def test_a_lens_reads_back_from_its_table(name: str) -> None:
     assert lens_from_table(lens.table()) == lens
 
 
-def test_a_preset_fills_what_the_user_leaves() -> None:
+def test_a_preset_fills_unset_fields() -> None:
     assert LensFields(preset="kinect", k1=0).k1 == 0
     assert LensFields(preset="kinect").fy == LENS_PRESETS["kinect"]["fy"]
     assert LensFields().intrinsics(PINHOLE) is PINHOLE
 
 
 @pytest.mark.parametrize("name", ["kinect", "tum_vi", "equirect"])
-def test_a_picture_from_pin_hole_faces_shows_each_ray_its_own_direction(name: str) -> None:
-    # Paint each face with its directions; the resampled picture must show those of its own rays.
+def test_a_picture_from_pinhole_faces_shows_each_ray_its_direction(name: str) -> None:
+    # Paint each face with its directions; the resampled picture must show the directions of its
+    # rays.
     camera = camera_of(name)
     faces, map_ = pinholes_of(camera)
     painted = []
     for face in faces:
         directions = face.exact_rays()[1]
         painted.append(directions / np.linalg.norm(directions, axis=-1, keepdims=True))
-    found = map_.bilinear(painted)
-    own = camera.exact_rays()[1]
-    sees = own.any(-1)
-    own = own[sees] / np.linalg.norm(own[sees], axis=-1, keepdims=True)
-    assert np.linalg.norm(found[sees] - own, axis=-1).max() < 2e-4
+    resampled = map_.bilinear(painted)
+    rays = camera.exact_rays()[1]
+    sees = rays.any(-1)
+    rays = rays[sees] / np.linalg.norm(rays[sees], axis=-1, keepdims=True)
+    assert np.linalg.norm(resampled[sees] - rays, axis=-1).max() < 2e-4
     # A lens of 195 degrees looks into five faces of the cube.
     assert len(faces) == {"kinect": 1, "tum_vi": 5, "equirect": 6}[name]

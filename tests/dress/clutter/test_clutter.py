@@ -1,4 +1,4 @@
-"""Small things stand on furniture: they touch it, nothing penetrates, books stand in shelves."""
+"""Small items on furniture touch it, nothing penetrates, and books are upright in shelves."""
 
 from __future__ import annotations
 
@@ -56,20 +56,20 @@ def _body(item: Item) -> Manifold:
 
 
 @pytest.mark.parametrize(("name", "holds"), [("Woven basket", "other_top"), ("Oven", "stove")])
-def test_a_top_holds_what_whole_words_of_its_name_say(name: str, holds: str) -> None:
+def test_words_of_its_name_decide_what_a_top_carries(name: str, holds: str) -> None:
     item = replace(solid("thing", [0, 0, 0], [0.6, 0.9, 0.6], OTHERFURNITURE), name=name)
     (top,) = supports_of_item(SceneTriangles([item]), 0, room())
     assert receptacle_of(item, top, RoomKind.LIVING) == holds
 
 
-def test_every_thing_touches_what_it_stands_on() -> None:
+def test_every_item_touches_its_support() -> None:
     mutable = _dressed(_room())
     levels = np.array([0.74, 0.9, 0.42, 0.12, 0.59, 1.06, 1.53, 2.0])
     added = _added(mutable)
     assert len(added) > 15
     for item in added:
         gap = item.bounds[0, 1] - levels
-        # Floor, board or top; shoes and bins stand on the floor.
+        # Touching floor, board or top; shoes and bins are on the floor.
         assert np.abs(gap).min() < 0.0005 or item.bounds[0, 1] < 0.0005, item.name
 
 
@@ -77,17 +77,21 @@ def test_nothing_penetrates_anything() -> None:
     for seed in (1, 2):
         mutable = _dressed(_room(), seed)
         bodies = [(item, _body(item)) for item in mutable.items]
-        for (one, a), (two, b) in combinations(bodies, 2):
-            apart = (one.bounds[0] > two.bounds[1] + 1e-4) | (two.bounds[0] > one.bounds[1] + 1e-4)
-            if apart.any() or (one in mutable.source.items and two in mutable.source.items):
+        for (first_item, a), (two, b) in combinations(bodies, 2):
+            is_apart = (first_item.bounds[0] > two.bounds[1] + 1e-4) | (
+                two.bounds[0] > first_item.bounds[1] + 1e-4
+            )
+            if is_apart.any() or (
+                first_item in mutable.source.items and two in mutable.source.items
+            ):
                 continue
-            assert (a ^ b).volume() < 1e-8, f"{one.name} in {two.name}"
+            assert (a ^ b).volume() < 1e-8, f"{first_item.name} in {two.name}"
 
 
-def test_books_stand_in_the_bookcase_with_their_spines_out() -> None:
+def test_books_are_upright_in_the_bookcase_with_their_spines_out() -> None:
     mutable = _dressed(_room())
     books = [i for i in _added(mutable) if i.nyu40 == _BOOKS and i.bounds[1, 2] < 0.31]
-    books = [i for i in books if i.bounds[1, 0] < 2.0]  # others lie on the desk
+    books = [i for i in books if i.bounds[1, 0] < 2.0]  # the others are on the desk
     assert books
     for item in books:
         assert item.box is not None
@@ -97,15 +101,15 @@ def test_books_stand_in_the_bookcase_with_their_spines_out() -> None:
 
 
 def test_the_same_seed_gives_the_same_bits_and_another_gives_others() -> None:
-    one, again, other = _dressed(_room(), 3), _dressed(_room(), 3), _dressed(_room(), 4)
-    assert [i.id for i in one.items] == [i.id for i in again.items]
-    for a, b in zip(one.items, again.items, strict=True):
+    first, again, other_seed = _dressed(_room(), 3), _dressed(_room(), 3), _dressed(_room(), 4)
+    assert [i.id for i in first.items] == [i.id for i in again.items]
+    for a, b in zip(first.items, again.items, strict=True):
         for s, t in zip(a.surfaces, b.surfaces, strict=True):
             assert s.positions.tobytes() == t.positions.tobytes()
-    assert [i.bounds.tolist() for i in one.items] != [i.bounds.tolist() for i in other.items]
+    assert [i.bounds.tolist() for i in first.items] != [i.bounds.tolist() for i in other_seed.items]
 
 
-def test_ids_are_unique_and_every_thing_has_a_class_and_a_room() -> None:
+def test_ids_are_unique_and_every_item_has_a_class_and_a_room() -> None:
     added = _added(_dressed(_room()))
     assert len({i.id for i in added}) == len(added)
     assert all(i.id.startswith("dress-clutter-") and i.nyu40 and i.room_id == "0_0" for i in added)
@@ -119,7 +123,7 @@ def test_a_smaller_share_puts_less() -> None:
     assert count(0.25) < 0.7 * count(1.0)
 
 
-def test_a_desk_has_one_laptop_and_none_beside_a_drawn_one() -> None:
+def test_a_desk_gets_one_laptop_unless_it_has_one() -> None:
     desk = solid("Desk", [1.0, 0, 0], [2.8, 0.74, 0.8], 14)
     drawn = replace(solid("Laptop", [1.1, 0.74, 0.2], [1.45, 0.98, 0.45], 40), name="Laptop")
     counts = []
@@ -147,7 +151,7 @@ def test_a_room_has_no_more_of_a_kind_than_people_keep(monkeypatch: pytest.Monke
     assert mutable.refused["clutter: enough of box in the room"] > 0
 
 
-def test_a_table_full_of_things_gets_no_more() -> None:
+def test_a_full_table_gets_no_more_items() -> None:
     block = solid("Monitor", [2.6, 0.74, 0.0], [3.8, 1.0, 0.6], 40)
     mutable = _dressed(house(solid("Desk", [2.6, 0, 0], [3.8, 0.74, 0.6], 14), block))
     assert not any(0.1 < i.bounds[0, 1] < 0.9 for i in _added(mutable))
@@ -160,8 +164,8 @@ def test_the_table_of_shares_names_kinds_that_exist() -> None:
             assert 0 < row.share <= 1
 
 
-def test_what_tables_put_on_surfaces_is_there_without_a_library() -> None:
-    # A worktop was to have a coffee machine and cutlery, which no library has.
+def test_items_of_the_tables_are_generated_without_a_library() -> None:
+    # The table asks for a coffee machine and cutlery on a worktop, which no library has.
     rng, style = np.random.default_rng(0), style_for(np.random.default_rng(1), "nordic")
     stock = Stock(EMPTY, book_covers(rng, style), 1)
     kinds = {row.kind for rows in shares().values() for row in rows}
@@ -189,7 +193,7 @@ def test_a_laid_table_has_a_plate_before_each_chair() -> None:
 
 def test_furniture_in_two_rooms_that_overlap_is_filled_once() -> None:
     home = house(solid("Desk", [2.6, 0, 0], [3.8, 0.74, 0.6], 14))
-    both = (replace(home.rooms[0], id="0_1"), *home.rooms)
-    once = [i for i in _added(_dressed(replace(home, rooms=both))) if i.bounds[0, 1] > 0.5]
+    two_rooms = (replace(home.rooms[0], id="0_1"), *home.rooms)
+    once = [i for i in _added(_dressed(replace(home, rooms=two_rooms))) if i.bounds[0, 1] > 0.5]
     assert once
     assert {i.room_id for i in once} == {"0_0"}

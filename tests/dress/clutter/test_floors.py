@@ -1,4 +1,4 @@
-"""Things on the floor keep out of the way: of doors, of ways, of each other."""
+"""Items on the floor keep clear of doors, ways and each other."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def _on_floor(mutable: MutableHouse) -> list[Item]:
     return [i for i in added if abs(i.bounds[0, 1] - floors[i.room_id or ""]) < 0.01]
 
 
-def test_things_on_the_floor_touch_it_inside_their_room() -> None:
+def test_items_on_the_floor_touch_it_inside_their_room() -> None:
     things = [(d, i) for seed in range(3) for d in [_dressed(seed)] for i in _on_floor(d)]
     assert len(things) >= 3
     for mutable, item in things:
@@ -42,7 +42,7 @@ def test_things_on_the_floor_touch_it_inside_their_room() -> None:
 
 
 @pytest.mark.long
-def test_no_thing_stands_before_a_door_and_the_doors_stay_joined() -> None:
+def test_no_item_is_before_a_door_and_the_doors_stay_connected() -> None:
     for seed in range(3):
         bare, dressed = MutableHouse(builtin_home(), seed), _dressed(seed)
         space, before = house_space(dressed), house_space(bare)
@@ -58,7 +58,7 @@ def test_no_thing_stands_before_a_door_and_the_doors_stay_joined() -> None:
                 assert doors_are_joined(floor_bitmap(space, room), room)
 
 
-def test_boxes_and_bins_stand_at_walls_and_not_beside_a_table_in_the_middle() -> None:
+def test_boxes_and_bins_are_at_walls_and_not_beside_a_free_table() -> None:
     table = solid("Table", [1.5, 0, 1.0], [2.5, 0.75, 2.0], 7)
     n = 0
     for seed in range(3):
@@ -71,8 +71,8 @@ def test_boxes_and_bins_stand_at_walls_and_not_beside_a_table_in_the_middle() ->
     assert n > 3
 
 
-def test_nothing_stands_before_the_doors_of_a_wardrobe() -> None:
-    # Its front is its box's third axis, +z: a strip as wide as it, 0.6 m deep.
+def test_the_floor_before_a_wardrobe_stays_free() -> None:
+    # The front is the box's third axis, +z: a strip of the wardrobe's width, 0.6 m deep.
     wardrobe = solid("Wardrobe", [0.5, 0, 0], [3.5, 2.0, 0.6], 3)
     low = solid("Bed", [0, 0, 1.8], [4, 0.5, 3], 4)
     before = shapely.box(0.5, 0.6, 3.5, 1.2)
@@ -84,8 +84,8 @@ def test_nothing_stands_before_the_doors_of_a_wardrobe() -> None:
             assert before.intersection(footprint).area < 1e-4, item.name
 
 
-def test_nothing_stands_where_a_drawer_comes_out() -> None:
-    # Of a desk, which is of no class that has fronts; it comes out by 1.1 m.
+def test_the_floor_before_a_drawer_stays_free() -> None:
+    # A drawer of a desk, whose class has no fronts, that comes out by 1.1 m.
     body = solid("Desk", [0.5, 0, 0], [3.5, 0.7, 0.6], 14)
     front = replace(solid("", [0.5, 0.2, 0.6], [3.5, 0.6, 0.62]).surfaces[0], part="drawer")
     joint = Joint("drawer", JointKind.PRISMATIC, (0, 0, 0), (0, 0, 1), 1.1)
@@ -101,14 +101,14 @@ def test_nothing_stands_where_a_drawer_comes_out() -> None:
     assert n > 3
 
 
-def test_a_room_without_floor_to_stand_on_gets_nothing() -> None:
+def test_a_room_without_free_floor_gets_nothing() -> None:
     full = solid("Block", [0, 0, 0], [4, 1.0, 3], 39)
     mutable = MutableHouse(house(full), 1)
     add_clutter(mutable, EMPTY, style_for(np.random.default_rng(1), "nordic"), 1.0)
     assert not _on_floor(mutable)
 
 
-def test_a_room_of_two_corners_is_left_alone() -> None:
+def test_a_room_of_two_corners_is_unchanged() -> None:
     home = house()
     flat = replace(home.rooms[0], polygon=np.array([[0.0, 0.0], [1.0, 0.0]]))
     mutable = MutableHouse(replace(home, rooms=(flat,)), 1)

@@ -1,4 +1,4 @@
-"""Pillows lie on beds and cushions lean on sofas: they touch, and nothing reaches into them."""
+"""Pillows on beds and cushions on sofas touch their support, and nothing reaches into them."""
 
 from __future__ import annotations
 
@@ -22,13 +22,13 @@ _PILLOW = 18
 
 
 def _bed() -> Item:
-    # Its head with a board at the wall x = 0; the mattress is 0.5 m high.
+    # A bed whose headboard is at the wall x = 0; the mattress is 0.5 m high.
     parts = [([0.0, 0.0, 0.5], [0.05, 0.9, 2.1]), ([0.05, 0.0, 0.5], [2.05, 0.5, 2.1])]
     return boards("Bed", parts, 4)
 
 
 def _sofa() -> Item:
-    # Its back at the wall z = 0, with two arms; the seat is 0.42 m high.
+    # A sofa with two arms whose back is at the wall z = 0; the seat is 0.42 m high.
     parts = [
         ([1.0, 0.0, 0.0], [3.0, 0.85, 0.2]), ([1.0, 0.0, 0.2], [1.15, 0.6, 0.9]),
         ([2.85, 0.0, 0.2], [3.0, 0.6, 0.9]), ([1.15, 0.0, 0.2], [2.85, 0.42, 0.9]),
@@ -66,8 +66,8 @@ def test_two_pillows_lie_at_the_head_of_a_double_bed() -> None:
     for pillow in at_head:
         assert pillow.bounds[0, 0] > 0.05
         assert pillow.bounds[0, 1] == pytest.approx(0.5, abs=0.0005)
-    one, two = (p.bounds for p in at_head)
-    assert one[1, 2] < two[0, 2] or two[1, 2] < one[0, 2], "side by side"
+    first, two = (p.bounds for p in at_head)
+    assert first[1, 2] < two[0, 2] or two[1, 2] < first[0, 2], "side by side"
 
 
 def test_a_bed_with_pillows_gets_no_others_at_its_head() -> None:
@@ -88,22 +88,22 @@ def test_a_sofas_seat_begins_before_its_back() -> None:
     assert place == pytest.approx([2.0, 0.2], abs=0.03)
 
 
-def test_cushions_stand_on_the_seat_and_lean_on_the_back() -> None:
+def test_cushions_rest_on_the_seat_and_lean_on_the_back() -> None:
     sofa = _sofa()
     cushions = [c for seed in range(4) for c in _pillows(house(sofa), seed)]
     assert len(cushions) >= 4
     for cushion in cushions:
         points = _points(cushion)
         ground = highest_below(points[:, [0, 2]], _corners(sofa), 0.6)
-        # It gives way by 1.2 mm, so that it touches with more than its lowest edge.
+        # It sinks in by 1.2 mm, so that more than its lowest edge touches.
         assert (points[:, 1] - ground).min() == pytest.approx(-0.0012, abs=0.0002)
-        # It is at the back, which is 20 cm deep, and between the arms.
+        # It is at the backrest, which is 20 cm deep, and between the arms.
         assert 0.1995 < points[points[:, 1] < 0.85][:, 2].min() < 0.23
         assert points[:, 0].min() > 1.15
         assert points[:, 0].max() < 2.85
 
 
-def test_nothing_is_laid_where_something_lies() -> None:
+def test_nothing_is_laid_on_other_items() -> None:
     case = solid("Case", [0.1, 0.5, 0.5], [2.0, 0.7, 2.1], 37)
     assert not _pillows(house(_bed(), case), 1)
 

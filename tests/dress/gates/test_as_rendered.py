@@ -1,4 +1,4 @@
-"""Gates hold for the house as it is rendered: repair drops walls, and nothing floats before the gap."""
+"""Gates are checked on the repaired house: repair removes walls, and no item may float in front of the gap."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ RIGHT: Rect = (4.07, 0.0, 8.0, 3.0)
 
 
 def _overlapping_walls() -> House:
-    """Two rooms 7 cm apart, each with walls of 10 cm: either's wall reaches into the other room."""
+    """Two rooms 7 cm apart, each with walls of 10 cm, so that each wall reaches into the other room."""
     a, b = room("0_0", LEFT), room("0_1", RIGHT)
     a, b = replace(a, name="Living room"), replace(b, name="Bedroom")
     walls = [replace(w, room_id="0_0") for w in walls_around(LEFT, "a", thickness=0.1)]
@@ -47,13 +47,13 @@ def _repaired(some: House) -> House:
 
 
 def _gaps(dressed: Dressed, repaired: House) -> dict[str, float]:
-    """By id, how far each thing that was hung is from the nearest wall, at most 10 cm."""
+    """Distance of each hung item, by id, from the nearest wall, at most 10 cm."""
     walls = np.concatenate([item_triangles(i) for i in repaired.items if i.kind is ItemKind.WALL])
-    found = {}
+    gaps = {}
     for item in dressed.house.items[dressed.n_source :]:
         if dressed.pieces[item.source_class].place is Place.WALL:
-            found[item.id] = _distance(item_triangles(item).reshape(-1, 3), walls)
-    return found
+            gaps[item.id] = _distance(item_triangles(item).reshape(-1, 3), walls)
+    return gaps
 
 
 def _distance(points: F64, corners: F64) -> float:
@@ -64,7 +64,7 @@ def _distance(points: F64, corners: F64) -> float:
 
 
 def _with_sockets(source: House) -> Dressed:
-    """A socket on each wall that a room sees, hung as the dressing hangs."""
+    """The house with a socket on each wall that a room sees, hung like the dressing's items."""
     with closing(MutableHouse(source, 1)) as mutable:
         lower = hanging_piece(
             "socket", "socket", OTHERPROP, [(box_at([0, 0.04, 0.01]), Material("white"))]
@@ -81,55 +81,59 @@ def box_at(middle: list[float]) -> Surface:
     return box("box", np.array(middle), np.array([0.04, 0.04, 0.01]), 0)
 
 
-def test_what_hung_on_a_wall_that_repair_drops_hangs_on_the_one_that_is_left() -> None:
+def test_items_of_a_wall_that_repair_drops_hang_on_the_remaining_one() -> None:
     dressed = _with_sockets(_overlapping_walls())
     repaired = _repaired(dressed.house)
     assert max(_gaps(dressed, repaired).values()) > 0.006
-    kept = refit_after_repair(repaired, dressed, EMPTY)
-    after = _repaired(kept.house)
-    assert len(_gaps(kept, after)) == 8
-    assert max(_gaps(kept, after).values()) <= 0.002
-    assert kept.report.moved_after_repair == 2
-    assert refit_after_repair(after, kept, EMPTY) is kept
+    refitted = refit_after_repair(repaired, dressed, EMPTY)
+    after = _repaired(refitted.house)
+    assert len(_gaps(refitted, after)) == 8
+    assert max(_gaps(refitted, after).values()) <= 0.002
+    assert refitted.report.moved_after_repair == 2
+    assert refit_after_repair(after, refitted, EMPTY) is refitted
 
 
-def test_what_finds_no_wall_any_more_goes_with_what_stood_on_it() -> None:
+def test_an_item_without_a_wall_is_removed_with_its_contents() -> None:
     dressed = _with_sockets(_overlapping_walls())
     first = dressed.house.items[dressed.n_source]
     repaired = _repaired(dressed.house)
-    # Nothing is left of the wall that it hangs on, nor of any near it.
+    # Its wall and all walls nearby are gone.
     far = repaired.with_items(
         i for i in repaired.items if i.kind is not ItemKind.WALL or _is_far(i, first)
     )
-    kept = refit_after_repair(far, dressed, EMPTY)
-    assert first.id not in {i.id for i in kept.house.items}
-    assert kept.report.refused["walls: floated or sank after repair"] >= 1
-    assert sum(kept.report.added.values()) == len(kept.house.items) - kept.n_source
+    refitted = refit_after_repair(far, dressed, EMPTY)
+    assert first.id not in {i.id for i in refitted.house.items}
+    assert refitted.report.refused["walls: floated or sank after repair"] >= 1
+    assert sum(refitted.report.added.values()) == len(refitted.house.items) - refitted.n_source
 
 
 def _is_far(wall: Item, thing: Item) -> bool:
     return bool((wall.bounds[0] > thing.bounds[1] + 0.1).any() or (wall.bounds[1] < thing.bounds[0] - 0.1).any())  # fmt: skip
 
 
-def test_a_house_whose_walls_stay_is_the_one_that_was_dressed() -> None:
+def test_a_house_whose_walls_stay_is_unchanged() -> None:
     a = replace(room("0_0", LEFT), name="Living room")
     dressed = _with_sockets(house([*walls_around(LEFT), *covers(a)], [a]))
     assert refit_after_repair(_repaired(dressed.house), dressed, EMPTY) is dressed
 
 
 def test_a_run_measures_the_gates_on_the_repaired_house(monkeypatch: pytest.MonkeyPatch) -> None:
-    made = _with_sockets(_overlapping_walls())
-    monkeypatch.setattr(dressing, "dressed_house", lambda *_: made)
+    with_sockets = _with_sockets(_overlapping_walls())
+    monkeypatch.setattr(dressing, "dressed_house", lambda *_: with_sockets)
     source = resolve("builtin").model_copy(update={"dress_seed": 1})
     recipe = with_settings(
         Recipe(), {"dress.catalogue": "generated", "repair.fallback_light": False}
     )
-    work = Preparation(source, recipe, lambda _share: None, finished_house, made.house)
+    work = Preparation(source, recipe, lambda _share: None, finished_house, with_sockets.house)
     finished, _repairs, report = PASS["repair"].run(PASS["dress"].run(work)).finished
     assert report is not None
     assert report.moved_after_repair == 2
     assert (
-        max(_gaps(made._replace(house=finished, n_source=_n_source(finished)), finished).values())
+        max(
+            _gaps(
+                with_sockets._replace(house=finished, n_source=_n_source(finished)), finished
+            ).values()
+        )
         <= 0.002
     )
 

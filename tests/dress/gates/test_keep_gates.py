@@ -1,4 +1,4 @@
-"""What breaks a gate is taken out, what stood on it too, and the count at the end is measured."""
+"""Items that break a gate are removed with their contents, and the final count is measured."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def piece(group: str, place: Place = Place.SURFACE, nyu40: int = 40) -> Piece:
 def with_box(
     mutable: MutableHouse, name: str, low: list[float], high: list[float], kind: Piece | None = None
 ) -> Item:
-    """Add a box as dressing adds things."""
+    """Add a box like an item of the dressing."""
     low_, high_ = np.array(low), np.array(high)
     half = (high_ - low_) / 2
     surface = box("", np.array([0.0, half[1], 0.0]), half, 0)
@@ -55,7 +55,7 @@ def names(mutable: MutableHouse) -> set[str]:
     return {item.id.removeprefix("dress-test-") for item in mutable.items}
 
 
-def test_what_stands_stays_and_what_floats_or_sinks_goes():
+def test_supported_items_stay_and_floating_or_sunk_ones_are_removed():
     mutable = MutableHouse(house(TABLE), 1)
     with_box(mutable, "stands", [1.1, 0.75, 1.1], [1.2, 0.85, 1.2])
     with_box(mutable, "almost", [1.3, 0.7515, 1.1], [1.4, 0.85, 1.2])
@@ -67,7 +67,7 @@ def test_what_stands_stays_and_what_floats_or_sinks_goes():
     assert mutable.refused["test: floated or sank"] == 2
 
 
-def test_what_stood_on_a_thing_that_goes_goes_too():
+def test_contents_of_a_removed_item_are_removed():
     mutable = MutableHouse(house(TABLE), 1)
     with_box(mutable, "tray", [1.1, 0.76, 1.1], [1.4, 0.78, 1.4])
     with_box(mutable, "cup", [1.2, 0.78, 1.2], [1.25, 0.85, 1.25])
@@ -78,7 +78,7 @@ def test_what_stood_on_a_thing_that_goes_goes_too():
     assert all(gate.n_left == 0 for gate in gates.values())
 
 
-def test_of_two_things_in_one_place_the_later_goes():
+def test_the_later_of_two_items_in_one_place_is_removed():
     mutable = MutableHouse(house(TABLE), 1)
     with_box(mutable, "first", [1.1, 0.75, 1.1], [1.3, 0.85, 1.3])
     with_box(mutable, "second", [1.2, 0.75, 1.2], [1.4, 0.85, 1.4])
@@ -87,14 +87,14 @@ def test_of_two_things_in_one_place_the_later_goes():
     assert (gates["penetration"].n_taken_out, gates["penetration"].n_left) == (1, 0)
 
 
-def test_a_thing_of_the_home_is_never_taken_out():
+def test_an_original_item_is_never_removed():
     twin = replace(TABLE, id="twin")
     mutable = MutableHouse(house(TABLE, twin), 1)
     assert gates_of(mutable)["penetration"].n_checked == 0
     assert names(mutable) == {"table", "twin"}
 
 
-def test_a_model_that_stands_in_another_thing_gives_way_to_the_one_that_stood_there():
+def test_a_model_inside_another_item_is_replaced_by_the_original():
     cup = solid("shelf", [1.0, 0.0, 1.9], [2.2, 1.0, 2.1])
     mutable = MutableHouse(house(TABLE, cup), 1)
     large = solid("table", [1.0, 0.0, 1.0], [2.2, 0.75, 2.0])
@@ -104,7 +104,7 @@ def test_a_model_that_stands_in_another_thing_gives_way_to_the_one_that_stood_th
     assert mutable.refused["swap: stood in another thing"] == 1
 
 
-def test_a_replaced_thing_may_hang_as_loosely_as_the_one_it_replaces():
+def test_a_replacement_may_hang_as_loosely_as_the_original():
     lamp = solid("lamp", [1.0, 1.5, 1.0], [1.2, 1.7, 1.2])
     mutable = MutableHouse(house(TABLE, lamp), 1)
     mutable.change(1, solid("lamp", [1.05, 1.5, 1.05], [1.15, 1.7, 1.15]), "swap")
@@ -112,7 +112,7 @@ def test_a_replaced_thing_may_hang_as_loosely_as_the_one_it_replaces():
     assert not mutable.refused
 
 
-def test_a_replaced_thing_of_another_class_is_put_back():
+def test_a_replacement_of_another_class_is_reverted():
     mutable = MutableHouse(house(TABLE), 1)
     mutable.change(0, solid("table", [1.0, 0.0, 1.0], [2.2, 0.75, 1.8], nyu40=5), "swap")
     gates = gates_of(mutable)
@@ -139,7 +139,7 @@ def test_a_picture_hangs_at_its_wall(out_m, stays):
     assert ("picture" in names(mutable)) is stays
 
 
-def test_nothing_stands_before_a_door_or_in_its_swing():
+def test_no_item_is_before_a_door_or_in_its_swing():
     home = empty_home()
     mutable = MutableHouse(home, 1)
     door = next(i for i in home.items if i.id == "door_inner")
@@ -171,7 +171,7 @@ def test_furniture_may_not_cover_a_fifth_of_a_window_and_curtains_may():
     assert gates["windows"].n_taken_out == 1
 
 
-def test_what_closes_the_way_between_two_doors_goes():
+def test_an_item_that_blocks_the_way_between_two_doors_is_removed():
     mutable = MutableHouse(empty_home(), 1)
     for k, z in enumerate((0.0, 1.0, 2.0, 3.0)):
         with_box(mutable, f"wall{k}", [2.6, 0.0, z], [2.8, 1.0, z + 1.0], piece("box", Place.FLOOR))
@@ -189,7 +189,7 @@ def test_people_are_no_obstacle():
 
 
 def drawer_chest(x: float, z: float) -> Item:
-    """60 cm wide, 50 deep, 70 high; its front at z comes out by 40 cm."""
+    """A chest of drawers 60 cm wide, 50 deep, 70 high; its front at z comes out by 40 cm."""
     body = solid("chest", [x, 0, z - 0.5], [x + 0.6, 0.7, z])
     front = replace(solid("", [x, 0.002, z], [x + 0.6, 0.698, z + 0.02]).surfaces[0], part="drawer")
     joint = Joint("drawer", JointKind.PRISMATIC, (0, 0, 0), (0, 0, 1), 0.4)
@@ -200,12 +200,12 @@ def drawer_chest(x: float, z: float) -> Item:
     ("ahead", "kind", "stays"),
     [
         (0.30, piece("box"), False),
-        (0.39, piece("box"), True),  # it opens by nine tenths
-        (0.30, piece("chair", Place.FLOOR, CHAIR), True),  # one pushes it aside
+        (0.39, piece("box"), True),  # it opens by 90 %
+        (0.30, piece("chair", Place.FLOOR, CHAIR), True),  # a chair can be pushed aside
     ],
     ids=["in the way", "beyond", "a chair"],
 )
-def test_what_stands_before_a_drawer_goes(ahead: float, kind: Piece, stays: bool) -> None:
+def test_an_item_before_a_drawer_is_removed(ahead: float, kind: Piece, stays: bool) -> None:
     mutable = MutableHouse(house(drawer_chest(1.0, 1.0)), 1)
     z = 1.02 + ahead
     with_box(mutable, "thing", [1.1, 0.0, z], [1.5, 0.5, z + 0.4], kind)

@@ -1,4 +1,4 @@
-"""Depths, distances and shells of meshes that are closed, open, thin or wound either way."""
+"""Depths, distances and shells of closed, open and thin meshes with either winding."""
 
 from __future__ import annotations
 
@@ -23,14 +23,14 @@ def body(item: Item, index: int = 0, *, is_new: bool = True) -> Body:
 
 
 def open_box(low: list[float], high: list[float], *without: int) -> F64:
-    """Triangles of a box without some of its sides: 0 -x, 1 +x, 2 -y, 3 +y, 4 -z, 5 +z."""
+    """Triangles of a box without some sides: 0 -x, 1 +x, 2 -y, 3 +y, 4 -z, 5 +z."""
     centre, half = (np.array(low) + high) / 2, (np.array(high) - low) / 2
     quads = box_quads(centre, half)
-    # Find which side each quad is.
+    # Find the side of each quad.
     out = quads.mean(1) - centre
     sides = [2 * int(np.argmax(np.abs(o))) + int(o[np.argmax(np.abs(o))] > 0) for o in out]
-    kept = np.array([q for q, side in zip(quads, sides, strict=True) if side not in without])
-    surface = quads_surface("", kept, 0)
+    quads_left = np.array([q for q, side in zip(quads, sides, strict=True) if side not in without])
+    surface = quads_surface("", quads_left, 0)
     return np.asarray(surface.positions[surface.faces], np.float64)
 
 
@@ -46,12 +46,12 @@ def test_boxes_that_overlap_by_a_depth_enter_each_other_so_deep():
     assert depth(table, solid("b", [0.4, 0.695, 0.4], [0.6, 1, 0.6])) <= 0.01
 
 
-def test_things_that_touch_share_nothing():
+def test_touching_items_do_not_overlap():
     table = solid("a", [0, 0, 0], [1, 0.7, 1])
     assert depth(table, solid("b", [0.4, 0.7, 0.4], [0.6, 1, 0.6])) == 0
 
 
-def test_a_thing_wholly_inside_another_is_found():
+def test_an_item_wholly_inside_another_is_found():
     assert depth(solid("a", [0, 0, 0], [1, 1, 1]), solid("b", [0.4] * 3, [0.6] * 3)) >= 0.2
 
 
@@ -61,10 +61,10 @@ def test_a_thin_plate_through_a_cupboard_is_found_though_it_shares_little():
 
 
 def test_two_thin_plates_that_cross_are_found_and_plates_that_touch_are_not():
-    one = solid("a", [0, 0, 0], [0.3, 0.3, 0.005])
+    plate = solid("a", [0, 0, 0], [0.3, 0.3, 0.005])
     across = solid("b", [0.15, 0, -0.2], [0.155, 0.3, 0.2])
-    assert depth(one, across) > 0.1
-    assert depth(one, solid("b", [0.15, 0, 0.005], [0.155, 0.3, 0.2])) == 0
+    assert depth(plate, across) > 0.1
+    assert depth(plate, solid("b", [0.15, 0, 0.005], [0.155, 0.3, 0.2])) == 0
 
 
 def test_a_book_through_a_shelf_is_found():
@@ -73,7 +73,7 @@ def test_a_book_through_a_shelf_is_found():
 
 
 def test_a_book_between_shelves_shares_nothing():
-    # Boards lie at 0.1 and from there every 0.47 m, 2 cm thick.
+    # Boards of 2 cm are at 0.1 m and every 0.47 m above.
     book = solid("book", [1.4, 0.12, 0.05], [1.43, 0.4, 0.25])
     assert depth(bookcase(), book) < 1e-6
 
@@ -92,16 +92,16 @@ def test_a_body_without_a_bottom_counts_as_full_and_a_bowl_as_empty():
 
 
 @pytest.mark.parametrize("is_flipped", [False, True])
-def test_depths_agree_with_a_sphere_however_it_is_wound(is_flipped):
+def test_depths_agree_with_a_sphere_of_either_winding(is_flipped):
     ball = sphere("", np.zeros(3), 1.0, 0, n=64)
     corners = np.asarray(ball.positions[ball.faces], np.float64)
     corners = corners[:, ::-1] if is_flipped else corners
     rng = np.random.default_rng(1)
     points = rng.uniform(-1, 1, (200, 3))
     inside = np.linalg.norm(points, axis=1) < 0.98
-    found = depths_inside(points, corners)
-    assert (found[inside] > 0).all()
-    assert (found[np.linalg.norm(points, axis=1) > 1.0] == 0).all()
+    depths = depths_inside(points, corners)
+    assert (depths[inside] > 0).all()
+    assert (depths[np.linalg.norm(points, axis=1) > 1.0] == 0).all()
 
 
 def test_a_ray_along_an_edge_is_counted_once():
@@ -116,7 +116,7 @@ def test_the_thickness_of_a_bent_skin_is_not_that_of_its_hull():
     assert thickness(np.concatenate([outer, inner])) < 0.007
 
 
-def test_connected_parts_are_shells_and_open_ones_are_told():
+def test_connected_parts_are_shells_and_open_ones_are_reported():
     corners = np.concatenate([open_box([0, 0, 0], [1, 1, 1]), open_box([2, 0, 0], [3, 1, 1], 2)])
     shells = shells_of(corners)
     assert sorted(s.is_closed for s in shells) == [False, True]
@@ -135,12 +135,12 @@ def test_an_open_body_is_measured_by_points():
     assert penetration_m(body(cushion), b, Solids()) == pytest.approx(0.1, abs=0.02)
 
 
-def test_upright_lines_meet_what_lies_above_and_below_and_edges_too():
+def test_upright_lines_hit_faces_above_and_below_and_their_edges():
     bodies = [body(solid("a", [0, 0, 0], [8, 0.5, 8])), body(solid("b", [1, 2, 1], [2, 3, 2]))]
     places = np.array([[1.5, 1.0, 1.5], [0.0, 1.0, 0.0], [9.0, 1.0, 9.0]])
     hits = Plumb(bodies, [0, 1]).hits(places, 2.1)
-    found = [sorted({round(float(y), 6) for y in hits.y[hits.place == k]}) for k in range(3)]
-    assert found == [[0.0, 0.5, 2.0, 3.0], [0.0, 0.5], []]
+    heights = [sorted({round(float(y), 6) for y in hits.y[hits.place == k]}) for k in range(3)]
+    assert heights == [[0.0, 0.5, 2.0, 3.0], [0.0, 0.5], []]
 
 
 def test_a_vase_turned_on_a_lathe_is_closed():

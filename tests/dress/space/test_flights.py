@@ -1,4 +1,4 @@
-"""Stairs of a room: where they stand, and where one steps on and off them."""
+"""Stairs of a room: their place, and the floor needed to step on and off."""
 
 from dataclasses import replace
 
@@ -19,26 +19,28 @@ def flights(floor_y: float = 0.0) -> Flights:
         for k in range(STEPS)
     ]
     stairs = replace(boards("stairs", boxes, 38), kind=ItemKind.STAIRS)
-    own = replace(room(), floor_y=floor_y, ceiling_y=floor_y + 2.5)
-    return flights_of(MutableHouse(house(stairs), 1), own, shapely.Polygon(own.polygon))
+    stair_room = replace(room(), floor_y=floor_y, ceiling_y=floor_y + 2.5)
+    return flights_of(
+        MutableHouse(house(stairs), 1), stair_room, shapely.Polygon(stair_room.polygon)
+    )
 
 
 def test_the_floor_before_the_first_step_is_kept_and_that_at_the_side_of_the_last_is_not() -> None:
-    found = flights()
-    assert found.before.contains(shapely.Point(0.0, 1.45))
-    assert not found.before.intersects(shapely.Point(2.9, 2.2))
-    assert abs(found.under.area - STEPS * 0.25 * 0.9) < 0.05
+    stairs = flights()
+    assert stairs.before.contains(shapely.Point(0.0, 1.45))
+    assert not stairs.before.intersects(shapely.Point(2.9, 2.2))
+    assert abs(stairs.under.area - STEPS * 0.25 * 0.9) < 0.05
 
 
-def test_upstairs_one_steps_off_at_the_last_step_and_the_stairs_stand_below() -> None:
-    found = flights(2.0)
-    assert found.before.contains(shapely.Point(3.5, 1.45))
-    assert not found.before.intersects(shapely.Point(0.2, 1.45))
-    assert found.under.is_empty
+def test_upstairs_the_last_step_is_kept_clear_and_the_stairs_are_below() -> None:
+    stairs = flights(2.0)
+    assert stairs.before.contains(shapely.Point(3.5, 1.45))
+    assert not stairs.before.intersects(shapely.Point(0.2, 1.45))
+    assert stairs.under.is_empty
 
 
 def test_a_room_without_stairs_keeps_nothing() -> None:
-    own = room()
-    found = flights_of(MutableHouse(house(), 1), own, shapely.Polygon(own.polygon))
-    assert found.under.is_empty
-    assert found.before.is_empty
+    bare_room = room()
+    stairs = flights_of(MutableHouse(house(), 1), bare_room, shapely.Polygon(bare_room.polygon))
+    assert stairs.under.is_empty
+    assert stairs.before.is_empty

@@ -1,4 +1,4 @@
-"""Rooms as dressing sees them: walls' free places, doors, windows, floors."""
+"""Rooms as dressing sees them: free stretches of walls, doors, windows, floors."""
 
 from __future__ import annotations
 
@@ -60,7 +60,7 @@ def test_the_face_follows_the_wall_and_not_an_outline_that_is_off(home: House) -
     assert east.origin[0] == pytest.approx(5.0, abs=1e-6)
 
 
-def test_s_runs_to_the_right_of_who_looks_at_the_wall(space: HouseSpace) -> None:
+def test_s_runs_to_the_right_facing_the_wall(space: HouseSpace) -> None:
     east = _face(space.room("0_0"), (-1, 0, 0))
     assert np.allclose(np.cross([0, 1, 0], east.normal), east.along)
     assert np.allclose(east.point(0.5, 1.0, 0.1), east.origin + 0.5 * east.along + [-0.1, 1.0, 0])
@@ -76,12 +76,12 @@ def test_openings_keep_ten_centimetres_of_wall(space: HouseSpace) -> None:
 
 def test_furniture_takes_the_wall_behind_it(space: HouseSpace) -> None:
     north = _face(space.room("0_0"), (0, 0, 1))
-    # The bookshelf stands at x = 3.6 before this wall.
+    # The bookshelf is in front of this wall at x = 3.6.
     s = float(north.s_of(np.array([[3.6, 0, 0]]))[0])
     assert north.free_m(s - 0.2, s + 0.2, 0.5, 1.0) < 0.05
 
 
-def test_starts_are_where_the_thing_fits(space: HouseSpace) -> None:
+def test_starts_are_where_the_item_fits(space: HouseSpace) -> None:
     east = _face(space.room("0_0"), (-1, 0, 0))
     starts = east.starts(0.6, 1.3, 1.8, 0.3)
     assert len(starts)
@@ -107,12 +107,10 @@ def test_a_door_knows_its_rooms_and_the_space_before_it(space: HouseSpace) -> No
     assert None in front.room_ids
 
 
-def test_an_openings_middle_lies_in_its_wall_however_deep_the_box_of_its_door_is(
-    home: House,
-) -> None:
+def test_an_openings_middle_is_in_its_wall_for_any_depth_of_its_doors_box(home: House) -> None:
     inner = next(o for o in home.openings if o.item_id == "door_inner")
     normal = np.asarray(inner.normal)
-    # The leaf is drawn open: the quad's plane lies halfway of 95 cm, not of the wall.
+    # The leaf is drawn open: the quad is in the middle of the 95 cm box instead of the wall.
     far = inner.cutter.positions @ normal > float(inner.quad.mean(0) @ normal)
     cutter = inner.cutter.positions + np.where(far[:, None], 0.8 * normal, 0.0)
     drawn = replace(
@@ -127,8 +125,8 @@ def test_an_openings_middle_lies_in_its_wall_however_deep_the_box_of_its_door_is
 
 
 @pytest.mark.parametrize("has_hole", [True, False])
-def test_a_door_without_an_opening_stands_in_the_hole_of_its_wall(has_hole: bool) -> None:
-    # The wall x = 2 parts two rooms; its door, drawn open, stands 0.9 m into the left one.
+def test_a_door_without_an_opening_is_in_the_hole_of_its_wall(has_hole: bool) -> None:
+    # The wall x = 2 separates two rooms; its door, drawn open, reaches 0.9 m into the left one.
     pieces = [(0.0, 1.0), (1.9, 4.0)] if has_hole else [(0.0, 4.0)]
     walls = [
         replace(_block(f"w{k}", (1.95, 0, z0), (2.05, 2.5, z1)), kind=ItemKind.WALL)
@@ -159,7 +157,7 @@ def test_a_window_knows_its_sill(space: HouseSpace) -> None:
     assert window.face_point(side)[2] == pytest.approx(4.0, abs=1e-6)
 
 
-def test_things_are_in_the_room_they_stand_in(home: House, space: HouseSpace) -> None:
+def test_items_belong_to_the_room_around_them(home: House, space: HouseSpace) -> None:
     for room in space.rooms:
         inside = {home.items[n].id for n in room.items}
         assert {

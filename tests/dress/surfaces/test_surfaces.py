@@ -28,7 +28,7 @@ def dressed(seed: int, house: House | None = None, share: float = 1.0) -> House:
 
 
 def long_wall() -> Item:
-    """A wall of 8 m along x, 20 cm thick, before two rooms on its +z side."""
+    """A wall of 8 m along x, 20 cm thick, with two rooms on its +z side."""
     left, right = np.array([[0, 0.1], [8, 0.1]]), np.array([[0, -0.1], [8, -0.1]])
     tops = np.full(2, 2.5)
     sides = wall_prism(left[::-1], right[::-1], -0.1, tops, tops, (0, 0, 0))
@@ -60,7 +60,7 @@ def test_repair_loses_no_wall_and_keeps_the_materials_of_the_rooms() -> None:
     repaired, report = repair(house, RepairFields())
     assert report.structure.walls_lost == ()
     assert report.structure.left_as_is == ()
-    # What the rooms saw before repair they see after it.
+    # The faces visible from the rooms are the same before and after repair.
     for kind in (ItemKind.WALL, ItemKind.FLOOR):
         before, after = (
             {h.materials[s.material].name for i in h.items if i.kind is kind for s in i.surfaces}
@@ -69,7 +69,7 @@ def test_repair_loses_no_wall_and_keeps_the_materials_of_the_rooms() -> None:
         assert before - after <= {"concrete"}
 
 
-def test_a_long_wall_is_cut_where_two_rooms_meet_and_its_other_side_is_outdoors() -> None:
+def test_a_long_wall_is_cut_between_two_rooms_and_its_other_side_is_outdoors() -> None:
     room = builtin_home().rooms[0]
     boxes = [shapely.box(0, 0.1, 3, 4), shapely.box(3.1, 0.1, 8, 4)]
     rooms = [
@@ -80,7 +80,7 @@ def test_a_long_wall_is_cut_where_two_rooms_meet_and_its_other_side_is_outdoors(
     faces = {(round(s.normal[0]), round(s.normal[2])): s for s in wall.sides}
     inner, outer = faces[0, 1], faces[0, -1]
     assert [r.room for r in inner.runs] == [0, 1]
-    # u runs to the right of who looks at the wall from the rooms: along +x.
+    # u runs to the right when facing the wall from the rooms: along +x.
     assert abs(inner.runs[0].end - inner.runs[0].start - 3.05) < 0.05
     assert [r.room for r in outer.runs] == [None]
 
@@ -155,10 +155,10 @@ def test_repair_takes_added_boards_as_boards() -> None:
     assert report.structure.left_as_is == ()
 
 
-def test_added_boards_have_their_coat_where_the_first_material_is_glass() -> None:
+def test_added_boards_have_their_coat_if_the_first_material_is_glass() -> None:
     source = builtin_home()
     bare = source.with_items(i for i in source.items if "baseboard" not in i.tags)
-    # Put glass first; every surface keeps its material by its number, one higher.
+    # Insert glass first; every surface keeps its material, whose number is one higher.
     items = [
         replace(i, surfaces=tuple(replace(s, material=s.material + 1) for s in i.surfaces))
         for i in bare.items

@@ -1,4 +1,4 @@
-"""Panelling, boards and brick on walls: which rooms may have them, and how high a foot is."""
+"""Panelling, boards and brick on walls: permitted rooms, and the height of a dado."""
 
 from __future__ import annotations
 
@@ -23,7 +23,7 @@ def style(*covers: str) -> Style:
 
 
 def finishes(walls: WallFinish, kind: RoomKind, *covers: str) -> list[WallFinish]:
-    """What becomes of the walls by a hundred seeds."""
+    """Finishes of the walls for a hundred seeds."""
     rngs = (np.random.default_rng(seed) for seed in range(100))
     return [covered(rng, style(*covers), walls, kind) for rng in rngs]
 
@@ -43,7 +43,7 @@ def test_the_share_of_covered_rooms_is_the_tables() -> None:
     assert all(f == PAINT for f in finishes(PAINT, RoomKind.LIVING)), "a taste without covers"
 
 
-def test_panels_end_where_their_picture_does() -> None:
+def test_panels_end_with_their_picture() -> None:
     feet = [f for f in finishes(PAINT, RoomKind.LIVING, "panels") if f.low is not None]
     assert len({f.low_m for f in feet}) > 1
     assert all(f.low is not None and f.low_m == size_of(f.low)[1] for f in feet)

@@ -1,4 +1,4 @@
-"""Curtains, blinds, rugs and towels: cloth that is closed, hangs on walls and lies on floors."""
+"""Curtains, blinds, rugs and towels: closed cloth, hung on walls or laid on floors."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def _bare() -> House:
 
 
 def _empty(*more: Item) -> House:
-    """The built-in home without its furniture, and with these things."""
+    """The built-in home with only these items as furniture."""
     home = builtin_home()
     bare = [i for i in home.items if not i.id.startswith("piece_")]
     return replace(home, items=(*bare, *more))
@@ -84,7 +84,7 @@ def test_cloth_is_a_closed_body_with_its_front_outside(surface: Surface) -> None
     assert ((flat * shading).sum(1) > -1e-12).mean() > 0.99
 
 
-def test_a_panel_has_the_folds_that_were_asked_for() -> None:
+def test_a_panel_has_the_requested_folds() -> None:
     folds = Pleats(0.15, 0.03, sway=0.0)
     depth = folds.depths(np.linspace(0, 0.9, 400), np.zeros(400))
     assert 5 <= np.count_nonzero(np.diff((depth > 0).astype(int)) == 1) <= 7
@@ -99,8 +99,8 @@ def test_curtains_hang_from_the_wall_over_the_window(seed: int) -> None:
     faces = {"window_living": (2, 0.0, 1.0), "window_bedroom": (2, 4.0, -1.0)}
     for item in _added(mutable, CURTAIN) + _added(mutable, BLINDS):
         points = np.concatenate([s.positions for s in item.surfaces])
-        axis, at, sign = faces["window_living" if item.room_id == "0_0" else "window_bedroom"]
-        out = sign * (points[:, axis] - at)
+        axis, centre, sign = faces["window_living" if item.room_id == "0_0" else "window_bedroom"]
+        out = sign * (points[:, axis] - centre)
         assert 0.0005 < out.min() < 0.001
         assert out.max() < 0.3
         assert item.bounds[1, 1] < 2.5
@@ -108,19 +108,19 @@ def test_curtains_hang_from_the_wall_over_the_window(seed: int) -> None:
             assert item.bounds[1, 1] > 2.1
 
 
-def test_a_bracket_finds_no_hold_where_a_round_wall_bends_away() -> None:
-    # The wall's face is z = 0, and from x = 1 on it bends 1 cm in 50 into the room.
+def test_a_bracket_needs_a_straight_wall() -> None:
+    # The wall's face is z = 0, and beyond x = 1 it bends into the room, 1 cm in 50.
     free = shapely.Polygon([(-2, 0), (1, 0), (2, 0.02), (2, 3), (-2, 3)])
-    seen = WindowSide(
+    side = WindowSide(
         cast(Passage, None), 0, np.zeros(3), np.array([1.0, 0, 0]), np.array([0, 0, 1.0]), 0, 2.5, 0
     )  # fmt: skip
-    assert is_flat(free, seen, -0.9)
-    assert is_flat(free, seen, 0.95)
-    assert not is_flat(free, seen, 1.3)
+    assert is_flat(free, side, -0.9)
+    assert is_flat(free, side, 0.95)
+    assert not is_flat(free, side, 1.3)
 
 
 def test_each_panel_covers_a_seventh_to_a_quarter_of_its_window_or_drapes_the_wall() -> None:
-    seen, draped = 0, 0
+    n_panels, draped = 0, 0
     for seed in range(1, 9):
         for item in _added(_dressed(seed, _empty()), CURTAIN):
             x0, x1 = (1.6, 3.4) if item.room_id == "0_0" else (6.7, 7.9)
@@ -129,15 +129,15 @@ def test_each_panel_covers_a_seventh_to_a_quarter_of_its_window_or_drapes_the_wa
             for sheet in sheets:
                 a, b = float(sheet.positions[:, 0].min()), float(sheet.positions[:, 0].max())
                 cover = (min(b, x1) - max(a, x0)) / (x1 - x0)
-                # From the ceiling down they cover half as much again, and all the wall that is free.
+                # From the ceiling down they cover half as much again, and the whole free wall.
                 is_draped = item.bounds[1, 1] > 2.4
                 assert (0.21 < cover < 0.39) if is_draped else (0.14 < cover < 0.26)
                 beside = max(x0 - a, b - x1)
                 assert (beside > 0.59) if is_draped else (beside < 0.49)
-                seen += 1
+                n_panels += 1
                 draped += is_draped
-    assert seen > 4
-    assert 0 < draped < seen
+    assert n_panels > 4
+    assert 0 < draped < n_panels
 
 
 @pytest.mark.long
@@ -145,16 +145,16 @@ def test_each_panel_covers_a_seventh_to_a_quarter_of_its_window_or_drapes_the_wa
     ("low", "high"),
     [
         ([3.45, 0.0, 0.02], [4.2, 2.0, 0.4]),  # a cupboard on one side of the window
-        ([1.0, 0.0, 0.02], [4.0, 0.88, 0.6]),  # a worktop before it
+        ([1.0, 0.0, 0.02], [4.0, 0.88, 0.6]),  # a worktop in front of the window
     ],
 )
-def test_a_window_that_cloth_fits_at_one_side_of_or_over_a_worktop_gets_a_blind(
+def test_a_window_with_cloth_on_one_side_or_over_a_worktop_gets_a_blind(
     low: list[float], high: list[float]
 ) -> None:
     a, b = np.array(low), np.array(high)
     thing = Item("t", "t", ItemKind.OBJECT, "0", (box("t", (a + b) / 2, (b - a) / 2, 0),), 3)
-    found = [_added(_dressed(seed, _empty(thing)), k) for seed in range(1, 3) for k in (CURTAIN, BLINDS)]  # fmt: skip
-    rooms = [(i.nyu40, i.room_id) for items in found for i in items]
+    n_added = [_added(_dressed(seed, _empty(thing)), k) for seed in range(1, 3) for k in (CURTAIN, BLINDS)]  # fmt: skip
+    rooms = [(i.nyu40, i.room_id) for items in n_added for i in items]
     assert (CURTAIN, "0_0") not in rooms
     assert (BLINDS, "0_0") in rooms
 
@@ -162,8 +162,8 @@ def test_a_window_that_cloth_fits_at_one_side_of_or_over_a_worktop_gets_a_blind(
 def test_a_window_that_has_curtains_keeps_them() -> None:
     home = _bare()
     cloth = box("c", np.array([2.5, 1.3, 0.06]), np.array([1.0, 1.2, 0.03]), 0)
-    own = Item("own", "Curtains", ItemKind.OBJECT, "0", (cloth,), CURTAIN)
-    full = replace(home, items=(*home.items, own))
+    cotton = Item("own", "Curtains", ItemKind.OBJECT, "0", (cloth,), CURTAIN)
+    full = replace(home, items=(*home.items, cotton))
     for seed in range(1, 6):
         mutable = _dressed(seed, full)
         assert all(i.room_id != "0_0" for i in _added(mutable, CURTAIN) + _added(mutable, BLINDS))
@@ -198,7 +198,7 @@ def test_some_seed_lays_a_large_rug_before_the_sofa() -> None:
     assert max(areas) > 2.5
 
 
-def test_a_room_with_a_rug_there_gets_no_second_one_on_it() -> None:
+def test_a_room_with_a_rug_gets_no_second_one_on_it() -> None:
     for seed in range(1, 5):
         mutable = _dressed(seed, builtin_home())
         old = next(i for i in mutable.items if i.nyu40 == RUG)
@@ -260,7 +260,7 @@ def test_a_drawn_rug_of_one_colour_gets_a_picture_that_covers_it_once() -> None:
     home = builtin_home()
     (place,) = (k for k, i in enumerate(home.items) if i.nyu40 == RUG)
     plain = tuple(replace(m, texture_id=None) for m in home.materials)
-    # What has a picture keeps it.
+    # An item with a picture keeps it.
     assert _dressed(3, home).items[place] is home.items[place]
     mutable = _dressed(3, replace(home, materials=plain))
     item = mutable.items[place]
@@ -273,8 +273,8 @@ def test_a_drawn_rug_of_one_colour_gets_a_picture_that_covers_it_once() -> None:
 
 
 @pytest.mark.long
-def test_curtains_hang_clear_of_what_opens_towards_the_window() -> None:
-    # A chest that looks at the window's wall; its drawers come to 5 cm before it.
+def test_curtains_keep_clear_of_drawers_that_open_towards_the_window() -> None:
+    # A chest facing the window's wall; its drawers come within 5 cm of it.
     space = house_space(MutableHouse(_bare(), 1))
     (window,) = space.room("0_0").windows
     side = window.side_of("0_0")
@@ -292,5 +292,5 @@ def test_curtains_hang_clear_of_what_opens_towards_the_window() -> None:
     assert any(i.room_id == "0_0" for m in usual for i in _added(m, CURTAIN))
     for seed in range(1, 7):
         for curtain in _added(_dressed(seed, _empty(chest)), CURTAIN):
-            # Short ones may end above it.
+            # Short curtains may end above the sill.
             assert curtain.room_id != "0_0" or curtain.bounds[0, 1] > 0.5

@@ -42,7 +42,7 @@ def _houses(n: int = 8) -> list[MutableHouse]:
 
 
 def _bare_houses(n: int) -> list[MutableHouse]:
-    """Houses made of a home without furniture, radiators hung below its windows."""
+    """Houses without furniture, with radiators hung below the windows."""
     home = builtin_home()
     bare = home.with_items(i for i in home.items if i.kind is not ItemKind.OBJECT)
     houses = [MutableHouse(bare, seed) for seed in range(1, n)]
@@ -66,7 +66,7 @@ def _named(mutable: MutableHouse, name: str) -> list[Item]:
         *((hung.wall_switch, (2, (0.9, 0.9, 0.9), n)) for n in range(6)),
     ],
 )  # fmt: skip
-def test_what_hangs_begins_at_its_wall_and_faces_outwards(
+def test_wall_items_begin_at_their_wall_and_face_outwards(
     thing: Thing[...], given: tuple[object, ...]
 ) -> None:
     _piece, shape = thing.make(np.random.default_rng(1), _style(), *given)
@@ -78,12 +78,12 @@ def test_what_hangs_begins_at_its_wall_and_faces_outwards(
 
 def test_radiators_hang_below_windows_in_most_homes_and_not_in_all() -> None:
     houses = _bare_houses(9)
-    wanted = [wants_radiators(mutable) for mutable in houses]
-    assert len(set(wanted)) == 2
-    for mutable, wants in zip(houses, wanted, strict=True):
-        found = _named(mutable, "Panel radiator")
-        assert bool(found) == wants
-        for item in found:
+    has_radiators = [wants_radiators(mutable) for mutable in houses]
+    assert len(set(has_radiators)) == 2
+    for mutable, wants in zip(houses, has_radiators, strict=True):
+        radiators = _named(mutable, "Panel radiator")
+        assert bool(radiators) == wants
+        for item in radiators:
             windows = [w for r in house_space(mutable).rooms for w in r.windows]
             middle = item.bounds.mean(0)
             nearest = min(windows, key=lambda w, m=middle: float(np.linalg.norm((w.centre - m)[[0, 2]])))  # fmt: skip
@@ -101,14 +101,14 @@ def test_added_radiators_have_the_coat_of_the_home() -> None:
     assert len(coats) > 2
 
 
-def test_a_home_that_has_a_radiator_gets_none() -> None:
+def test_a_home_with_a_radiator_gets_none() -> None:
     house = builtin_home()
     drawn = replace(house.items[-1], id="drawn", name="Radiator", source_class="radiator")
     assert not wants_radiators(MutableHouse(house.with_items((*house.items, drawn)), 3))
 
 
 @pytest.mark.long
-def test_coats_hang_free_of_the_floor() -> None:
+def test_coats_hang_clear_of_the_floor() -> None:
     coats = [i for mutable in _houses() for i in _named(mutable, "Coat rack")]
     assert coats
     for item in coats:
@@ -117,22 +117,22 @@ def test_coats_hang_free_of_the_floor() -> None:
 
 def test_no_coats_hang_over_a_bed_or_beside_it() -> None:
     rect = (0.0, 0.0, 3.4, 3.4)
-    own = replace(wall_rooms.room("0_0", rect), name="Bedroom")
+    bedroom = replace(wall_rooms.room("0_0", rect), name="Bedroom")
     bed = replace(solid("Bed", [0.7, 0.0, 0.02], [2.3, 0.5, 2.0]), nyu40=BED)
-    home = wall_rooms.house([*walls_around(rect), *covers(own), bed], [own])
+    home = wall_rooms.house([*walls_around(rect), *covers(bedroom), bed], [bedroom])
     n = 0
     for seed in range(12):
         mutable = MutableHouse(home, seed)
         space = house_space(mutable)
         hang_coats(Hanging(mutable, space.rooms[0], "walls"), space, _style(), 1.0)
         for item in mutable.items[len(mutable.source.items) :]:
-            apart = np.maximum(item.bounds[0] - bed.bounds[1], bed.bounds[0] - item.bounds[1])
-            assert apart[[0, 2]].max() >= 0.5
+            gap = np.maximum(item.bounds[0] - bed.bounds[1], bed.bounds[0] - item.bounds[1])
+            assert gap[[0, 2]].max() >= 0.5
             n += 1
     assert n > 2
 
 
-def test_every_use_of_a_room_has_a_row_of_what_it_gets() -> None:
+def test_every_use_of_a_room_has_a_row_of_wall_items() -> None:
     assert set(WANTS) == set(RoomKind)
     for row in WANTS.values():
         assert row.pictures <= row.most_pictures
@@ -141,10 +141,10 @@ def test_every_use_of_a_room_has_a_row_of_what_it_gets() -> None:
 
 
 @pytest.mark.long
-def test_notes_hang_flat_on_a_wall_at_the_height_of_eyes() -> None:
-    found = [(m, item) for m in _houses() for item in _named(m, "Wall notes")]
-    assert found
-    for mutable, item in found:
+def test_notes_hang_flat_on_a_wall_at_eye_height() -> None:
+    notes = [(m, item) for m in _houses() for item in _named(m, "Wall notes")]
+    assert notes
+    for mutable, item in notes:
         low, high = item.bounds
         floor_y = next(r.floor_y for r in mutable.source.rooms if r.id == item.room_id)
         assert min(high[0] - low[0], high[2] - low[2]) < 0.002

@@ -1,4 +1,4 @@
-"""What hangs on walls: where, how it is made, and that a seed decides it."""
+"""Items on walls: place, shape, and dependence on the seed."""
 
 from __future__ import annotations
 
@@ -48,7 +48,7 @@ def _added(mutable: MutableHouse) -> list[Item]:
 
 
 def _face_of(item: Item, space: HouseSpace) -> WallFace:
-    """The face whose plane the item's back is nearest to, of those that it turns its back to."""
+    """The face nearest to the item's back, of those that its back faces."""
     points = np.concatenate([s.positions for s in item.surfaces]).astype(np.float64)
     faces = [f for r in space.rooms if r.room.id == item.room_id for f in r.faces]
     return min(faces, key=lambda f: abs(float(f.out_of(points).min())))
@@ -56,7 +56,7 @@ def _face_of(item: Item, space: HouseSpace) -> WallFace:
 
 @pytest.mark.quick(2)
 @pytest.mark.parametrize("seed", range(1, 6))
-def test_things_hang_within_a_millimetre_of_the_wall(seed: int) -> None:
+def test_items_hang_within_a_millimetre_of_the_wall(seed: int) -> None:
     mutable = _dressed(seed)
     space = house_space(MutableHouse(builtin_home(), 1))
     assert _added(mutable)
@@ -85,19 +85,19 @@ def test_nothing_hangs_over_an_opening_or_above_the_ceiling(seed: int) -> None:
 
 @pytest.mark.quick(2)
 @pytest.mark.parametrize("seed", range(1, 6))
-def test_things_keep_clear_of_furniture_and_of_each_other(seed: int) -> None:
+def test_wall_items_keep_clear_of_furniture_and_of_each_other(seed: int) -> None:
     mutable = _dressed(seed)
     space = house_space(mutable)
     added = range(len(mutable.source.items), len(mutable.items))
     for n in added:
         low, high = space.bounds[n]
-        for m, other in enumerate(mutable.items):
-            if m != n and len(space.points[m]) and other.kind is not ItemKind.DOOR:
+        for m, neighbour in enumerate(mutable.items):
+            if m != n and len(space.points[m]) and neighbour.kind is not ItemKind.DOOR:
                 inside = ((space.points[m] > low) & (space.points[m] < high)).all(1)
-                assert not inside.any(), (mutable.items[n].name, other.name)
+                assert not inside.any(), (mutable.items[n].name, neighbour.name)
 
 
-def test_a_home_gets_pictures_and_every_thing_its_class_source_and_seed() -> None:
+def test_a_home_gets_pictures_and_every_item_has_class_source_and_seed() -> None:
     mutable = _dressed(3)
     classes = [i.nyu40 for i in _added(mutable)]
     assert classes.count(PICTURE) >= 2
@@ -119,7 +119,7 @@ def test_a_seed_decides_every_bit() -> None:
     assert a.textures.keys() != c.textures.keys()
 
 
-def test_no_share_hangs_nothing() -> None:
+def test_a_share_of_zero_hangs_nothing() -> None:
     assert not _added(_dressed(1, 0.0))
 
 
@@ -132,7 +132,7 @@ def test_every_family_of_prints_shows_something(family: str) -> None:
     assert picture.std() > 0.02
 
 
-def test_prints_have_the_shape_that_is_asked_for() -> None:
+def test_prints_have_the_requested_shape() -> None:
     pixels, _family = print_pixels(np.random.default_rng(1), 0.7, _style())
     assert pixels.dtype == np.uint8
     assert pixels.shape[1] / pixels.shape[0] == pytest.approx(0.7, abs=0.01)
@@ -172,7 +172,7 @@ def test_a_framed_print_shows_its_picture_upright_and_its_faces_outward() -> Non
             )
 
 
-def test_a_round_thing_looks_away_from_the_wall() -> None:
+def test_a_round_item_faces_away_from_the_wall() -> None:
     dial = hung_things.jpeg_texture("t", np.zeros((8, 8, 3), np.uint8))
     for _piece, shape in (
         hung_things.clock(0.3, dial, Material("rim")),
@@ -199,12 +199,12 @@ def _photograph(width: int, height: int) -> Picture:
     )
 
 
-def test_the_users_own_photographs_hang_before_drawn_prints() -> None:
-    own = Catalogue((), lambda _piece: None, "own", pictures=(_photograph(90, 60),))
-    mutable = _dressed(2, catalogue=own)
+def test_the_users_photographs_hang_before_drawn_prints() -> None:
+    photographs = Catalogue((), lambda _piece: None, "own", pictures=(_photograph(90, 60),))
+    mutable = _dressed(2, catalogue=photographs)
     names = [t.name for t in mutable.textures.values() if t.name.startswith("print")]
     assert names.count("print photograph.jpg") == 1
-    # The rest is drawn, as without them.
+    # The other prints are drawn, as without photographs.
     assert len(names) > 1
 
 

@@ -1,4 +1,4 @@
-"""Buildings have windows that lie in their walls; leaves have holes between them."""
+"""Windows of buildings are in their walls; leaves have holes between them."""
 
 from __future__ import annotations
 
@@ -33,23 +33,23 @@ def built(own: Facade, *, is_house: bool) -> dict[str, F64]:
         block(scenery, "one", rng, FRONT, own, rooms, 4, 5, has_balconies=True)
     items, materials, _textures = scenery.items("0", 0)
     (item,) = items
-    found: dict[str, list[F64]] = {}
+    corners_by_name: dict[str, list[F64]] = {}
     for surface in item.surfaces:
         name = materials[surface.material].name.split()[-1]
-        found.setdefault(name, []).append(corners_of_surfaces([surface]))
-    return {name: np.concatenate(rows) for name, rows in found.items()}
+        corners_by_name.setdefault(name, []).append(corners_of_surfaces([surface]))
+    return {name: np.concatenate(rows) for name, rows in corners_by_name.items()}
 
 
 @pytest.mark.parametrize(("styles", "number"), STYLES)
-def test_windows_lie_behind_the_wall_and_nothing_of_it_stands_before_them(
+def test_windows_are_behind_the_wall_and_unobstructed(
     styles: tuple[Style, ...], number: int
 ) -> None:
-    own = facade(np.random.default_rng(number), number, styles)
-    found = built(own, is_house=styles is HOUSES)
-    windows = found["windows"]
+    front = facade(np.random.default_rng(number), number, styles)
+    corners_by_name = built(front, is_house=styles is HOUSES)
+    windows = corners_by_name["windows"]
     np.testing.assert_allclose(windows[..., 2], -0.17, atol=1e-6)
-    # The front's wall has its holes there: no triangle of it has a window's middle inside.
-    wall = found["wall"][(np.abs(found["wall"][..., 2]) < 1e-6).all(1)][..., :2]
+    # The front wall has holes there: no triangle of it contains the middle of a window.
+    wall = corners_by_name["wall"][(np.abs(corners_by_name["wall"][..., 2]) < 1e-6).all(1)][..., :2]
     middles = windows.reshape(-1, 2, 3, 3).mean((1, 2))[:, :2]
     a, b, c = (wall[:, k] for k in range(3))
     sides = [_side(p, q, middles) for p, q in ((a, b), (b, c), (c, a))]
@@ -57,13 +57,13 @@ def test_windows_lie_behind_the_wall_and_nothing_of_it_stands_before_them(
     assert len(wall) > 40
     assert not inside.any()
     # A window or a door in each bay of each storey.
-    n = len(windows) // 2 + len(found["door"]) // 2
-    assert n % max(round(float(np.ptp(wall[..., 0])) / own.bay_m), 1) == 0
+    n = len(windows) // 2 + len(corners_by_name["door"]) // 2
+    assert n % max(round(float(np.ptp(wall[..., 0])) / front.bay_m), 1) == 0
     assert windows[..., 1].max() > STOREY_M * 0.7
 
 
 def _side(p: F64, q: F64, points: F64) -> F64:
-    """(T, N) on which side of the lines p to q (T, 2) points (N, 2) lie."""
+    """(T, N) side of the lines p to q (T, 2) for the points (N, 2)."""
     d, to = q - p, points[None] - p[:, None]
     return np.asarray(d[:, None, 0] * to[..., 1] - d[:, None, 1] * to[..., 0])
 
@@ -84,7 +84,7 @@ def test_sprays_of_leaves_have_holes(number: int) -> None:
     plants = [leaves._replace(tint=k) for k in range(len(leaves.tints))]
     assert {m.name for m in cut} in [{p.outer.name, p.inner.name} for p in plants]
     assert {textures[m.texture_id or ""].media_type for m in cut} == {"image/png"}
-    # It stands on its foot and is about as high as asked.
+    # It rests on its foot and has about the requested height.
     corners = corners_of_surfaces(items[0].surfaces)
     assert abs(corners[..., 1].min()) < 0.1
     assert 5.5 < corners[..., 1].max() < 9.0
@@ -96,11 +96,11 @@ def test_a_line_of_trees_ends_in_the_air_and_has_no_hole_at_its_foot() -> None:
     assert share_left(picture[:2]) < 0.2
 
 
-def test_colours_are_those_of_real_things() -> None:
+def test_colours_are_realistic() -> None:
     looks: list[SceneryMaterial] = []
     for styles, number in STYLES:
-        own = facade(np.random.default_rng(number), number, styles)
-        looks += [own.wall, own.windows, own.roof, own.door]
+        front = facade(np.random.default_rng(number), number, styles)
+        looks += [front.wall, front.windows, front.roof, front.door]
     for look in looks:
         assert look.picture is not None
         assert float(look.picture[..., :3].min()) >= 0, look.name

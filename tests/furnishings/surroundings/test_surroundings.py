@@ -1,4 +1,4 @@
-"""What lies before the windows: outside the home, seen, of no class, by a seed."""
+"""Surroundings outside the windows: outside the home, visible, without a class, by a seed."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def outside(house: House) -> list[Item]:
 
 
 def distances_m(item: Item) -> F64:
-    """Of the triangles' plan to the room with its walls, 0.2 m thick."""
+    """Distances of the triangles' plan from the room with its walls, 0.2 m thick."""
     walls = shapely.box(*RECT).buffer(0.2, join_style="mitre")
     corners = corners_of_surfaces(item.surfaces)[:, :, [0, 2]]
     return np.asarray(shapely.distance(walls, shapely.multipoints(corners)))
@@ -39,28 +39,28 @@ def distances_m(item: Item) -> F64:
 
 @pytest.mark.quick(2)
 @pytest.mark.parametrize("kind", surroundings.KINDS)
-def test_things_stand_off_the_walls_and_are_no_objects(home: House, kind: str) -> None:
+def test_surroundings_are_off_the_walls_and_are_no_objects(home: House, kind: str) -> None:
     after = with_surroundings(home, kind, 1)
-    found = outside(after)
-    # They come last, so that no other instance id changes.
+    items_outside = outside(after)
+    # They are last, so that no other instance id changes.
     assert after.items[: len(home.items)] == home.items
-    assert found == list(after.items[len(home.items) :])
-    assert 1_000 < sum(i.n_faces for i in found) < surroundings.MAX_FACES
-    assert {(i.kind, i.nyu40, i.lights) for i in found} == {(ItemKind.GROUND, 0, ())}
-    for item in found:
+    assert items_outside == list(after.items[len(home.items) :])
+    assert 1_000 < sum(i.n_faces for i in items_outside) < surroundings.MAX_FACES
+    assert {(i.kind, i.nyu40, i.lights) for i in items_outside} == {(ItemKind.GROUND, 0, ())}
+    for item in items_outside:
         if item.id.removeprefix("outside_") not in NEAR:
             assert distances_m(item).min() > surroundings.LEAST_M, item.id
     # The ground ends at the walls, below the sill, and is under no room.
-    (ground,) = [i for i in found if i.id == "outside_ground"]
+    (ground,) = [i for i in items_outside if i.id == "outside_ground"]
     assert ground.bounds[1, 1] < 0.9
     middles = shapely.points(corners_of_surfaces(ground.surfaces).mean(1)[:, [0, 2]])
     assert not shapely.contains(shapely.box(*RECT), middles).any()
 
 
-def test_the_same_seed_gives_the_same_bits_and_another_one_another_place(home: House) -> None:
+def test_the_same_seed_gives_the_same_bits_and_another_seed_another_place(home: House) -> None:
     def bits(seed: int) -> bytes:
-        found = outside(with_surroundings(home, "drawn", seed))
-        return b"".join(s.positions.tobytes() for i in found for s in i.surfaces)
+        items_outside = outside(with_surroundings(home, "drawn", seed))
+        return b"".join(s.positions.tobytes() for i in items_outside for s in i.surfaces)
 
     assert bits(1) == bits(1)
     assert bits(1) != bits(2)
@@ -79,7 +79,7 @@ def test_upper_storeys_look_down_and_houses_see_the_ground(home: House) -> None:
 
     below = depths(home)
     assert len(below) > 2
-    assert max(below) > 8  # a flat lies on the ground or up to four storeys above it
+    assert max(below) > 8  # a flat is on the ground or up to four storeys above it
     garage = replace(home.rooms[0], id="0_9", name="Garage")
     assert len(depths(replace(home, rooms=(*home.rooms, garage)))) == 1
 
@@ -109,7 +109,7 @@ def test_a_home_without_windows_stays_as_it_is(home: House) -> None:
     assert with_surroundings(blind, "drawn", 1) is blind
 
 
-def test_what_lies_before_the_windows_is_in_the_digest_of_a_recipe() -> None:
+def test_surroundings_are_in_the_digest_of_a_recipe() -> None:
     groups = ("read", "repair")
     assert recipe_from_name("paper").surroundings.kind == "none"
     assert recipe_from_name("released").surroundings.kind == "none"

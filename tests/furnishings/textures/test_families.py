@@ -77,10 +77,10 @@ def test_dark_wood_makes_a_darker_floor_than_pale_wood() -> None:
 
 def test_normals_lean_away_from_a_rise_along_u_and_v() -> None:
     x = np.sin(2 * np.pi * (np.arange(64) + 0.5) / 64).astype(np.float32)
-    # A quarter of the way up the wave along u, the surface faces back along u.
+    # On the rising quarter of the wave along u, the surface faces back along u.
     along_u = normals_from_height(np.tile(0.05 * x, (64, 1)), (1.0, 1.0))
     assert along_u[0, 0, 0] < 120 < 135 < along_u[0, 32, 0]
-    # Row 0 is the upper edge: what rises with the row falls with v.
+    # Row 0 is the upper edge: height that rises with the row falls with v.
     along_v = normals_from_height(np.tile(0.05 * x[:, None], (1, 64)), (1.0, 1.0))
     assert along_v[0, 0, 1] > 135
 
@@ -91,7 +91,7 @@ def test_noise_is_of_unit_deviation_and_a_blur_keeps_its_mean() -> None:
     assert abs(float(blurred(field, 3.0).mean()) - 3) < 1e-3
 
 
-def test_a_pattern_is_one_material_of_a_draft_however_often_it_is_asked_for() -> None:
+def test_a_pattern_requested_repeatedly_is_one_material() -> None:
     house = builtin_home()
     mutable = MutableHouse(house, 1)
     pattern = Pattern("tiles", 7, GREEN, variant="30")

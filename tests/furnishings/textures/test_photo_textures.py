@@ -35,7 +35,7 @@ def test_as_many_pictures_as_drawn_ones_take_half_of_the_floors() -> None:
     assert len(set(shown)) > 10
 
 
-def test_a_picture_that_repeats_every_few_centimetres_is_for_furniture_alone() -> None:
+def test_a_picture_that_repeats_every_few_centimetres_is_only_for_furniture() -> None:
     small = _catalogue(*(_picture(f"w{k}", g, 0.4) for k, g in enumerate(["planks", "wood"] * 30)))
     assert not any(_shown(small, "planks"))
     assert any(_shown(small, "grain"))
@@ -46,10 +46,10 @@ def test_a_photographed_material_has_its_size_and_its_mean() -> None:
     mutable = MutableHouse(builtin_home(), 1)
     several = (photographed(mutable, catalogue, Pattern("weave", seed)) for seed in range(9))
     pattern = next(p for p in several if p.photograph)
-    made = pattern_material(mutable, pattern)
-    assert made.size_m == (0.4, 0.4)
-    assert made.mean_rgb == pytest.approx([0.216] * 3, abs=0.01)
-    assert mutable.materials[made.number].texture_id == pattern.photograph
+    material = pattern_material(mutable, pattern)
+    assert material.size_m == (0.4, 0.4)
+    assert material.mean_rgb == pytest.approx([0.216] * 3, abs=0.01)
+    assert mutable.materials[material.number].texture_id == pattern.photograph
     assert pattern.photograph in mutable.textures
 
 

@@ -1,4 +1,4 @@
-"""Variations of families are closed, as large as they say, and the same each time."""
+"""Variations of families are closed, have their stated size, and are reproducible."""
 
 from __future__ import annotations
 
@@ -47,29 +47,29 @@ def _hold(piece: Piece) -> None:
     assert low[0] + high[0] == pytest.approx(0, abs=1e-5)
     back = low[2] if piece.place is Place.WALL else low[2] + high[2]
     assert back == pytest.approx(0, abs=1e-5)
-    # It is drawn at about the size that it says, so that fitting it bends nothing.
+    # It is drawn at about its stated size, so that fitting distorts nothing.
     assert np.asarray(drawn_size(piece)) / piece.size == pytest.approx(1, abs=0.16)
     assert bool(shape.lights) == (piece.kind is ItemKind.LAMP)
 
 
 @pytest.mark.parametrize("name", _NAMES)
-def test_a_variation_is_closed_and_as_large_as_it_says(name: str) -> None:
+def test_a_variation_is_closed_and_has_its_stated_size(name: str) -> None:
     for piece in _pieces(name)[:2]:
         _hold(piece)
 
 
 @pytest.mark.slow
 @pytest.mark.parametrize("name", _NAMES)
-def test_every_variation_is_closed_and_as_large_as_it_says(name: str) -> None:
+def test_every_variation_is_closed_and_has_its_stated_size(name: str) -> None:
     for piece in _pieces(name):
         _hold(piece)
 
 
 def test_a_variation_made_again_has_the_same_bits() -> None:
     for name in _NAMES[::4]:
-        one, two = (family_shape(_pieces(name)[0]) for _ in range(2))
-        assert one.materials == two.materials
-        assert [s.positions.tobytes() for s in one.surfaces] == [
+        first, two = (family_shape(_pieces(name)[0]) for _ in range(2))
+        assert first.materials == two.materials
+        assert [s.positions.tobytes() for s in first.surfaces] == [
             s.positions.tobytes() for s in two.surfaces
         ]
 
@@ -85,8 +85,8 @@ def test_a_catalogue_with_families_has_another_digest_and_loads_them() -> None:
 def install(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> Iterator[Callable[[str, str], None]]:
-    """Installs a package of furniture in one file, its name and text given, and takes it out again."""
-    known = (plugins, families, family_pieces, family_numbers, families_digest)
+    """Installs a package of furniture of one file, given its name and text, and removes it again."""
+    caches = (plugins, families, family_pieces, family_numbers, families_digest)
     monkeypatch.syspath_prepend(str(tmp_path))
 
     def installed(name: str, text: str) -> None:
@@ -95,11 +95,11 @@ def install(
         info.mkdir()
         (info / "METADATA").write_text(f"Metadata-Version: 2.1\nName: {name}\nVersion: 1.0\n")
         (info / "entry_points.txt").write_text(f"[pbrs_farm.furniture]\n{name} = {name}\n")
-        for cached in known:
+        for cached in caches:
             cached.cache_clear()
 
     yield installed
-    for cached in known:
+    for cached in caches:
         cached.cache_clear()
 
 
@@ -138,7 +138,7 @@ def test_a_file_is_all_that_a_new_piece_of_furniture_takes(
     [("sofa", _BODY, "broken: sofa: is already the name of another object"),
      ("nothing", "pass", "broken: nothing: has nothing in it")],
 )  # fmt: skip
-def test_what_is_wrong_with_a_plugins_furniture_is_named(
+def test_faults_of_a_plugins_furniture_are_named(
     install: Callable[[str, str], None], name: str, body: str, error: str
 ) -> None:
     sys.modules.pop("broken", None)
@@ -155,7 +155,7 @@ def test_a_plugin_that_names_no_families_is_refused(install: Callable[[str, str]
         with_families(EMPTY)
 
 
-def test_units_of_a_kitchen_that_have_one_number_have_one_front() -> None:
+def test_kitchen_units_with_one_number_share_a_front() -> None:
     sets: dict[str, list[Piece]] = {}
     for piece in family_pieces():
         if piece.of_set.startswith("kitchen_set") and piece.group in ("base_cabinet", "sink"):
@@ -166,13 +166,13 @@ def test_units_of_a_kitchen_that_have_one_number_have_one_front() -> None:
         assert any("front" in m.name or "wood" in m.name for m in shared)
 
 
-def test_bodies_enclose_what_their_formulas_say() -> None:
+def test_bodies_have_the_volume_of_their_formulas() -> None:
     def volume(surface: Surface) -> float:
         corners = triangle_corners(surface.positions, surface.faces)
         assert closed_edge_share(np.round(corners, 6)) == 1.0
         return float(signed_volume(corners, corners.mean((0, 1))))
 
-    # A cut along twelve edges takes half a square of r off each.
+    # A bevel along twelve edges removes half a square of r from each.
     cut = volume(bodies.bevelled((0, 0, 0), (1, 1, 1), 0.02))
     assert cut == pytest.approx(1 - 12 * 0.02**2 / 2, abs=2e-4)
     ball = volume(bodies.rounded((0, 0, 0), (2, 2, 2), 1.0, n=12))

@@ -14,7 +14,7 @@ from pbrs_farm.dress.style import style_for
 from pbrs_farm.furnishings.things.appliances import microwave
 from pbrs_farm.furnishings.things.families import families, family_pieces, family_shape
 
-# What stands in homes and has fronts; of each the least space behind one, metres.
+# Furniture with fronts, and the least depth of the space behind one, metres.
 _CLOSED = {
     "base_cabinet": 0.3, "drawer_cabinet": 0.3, "upper_cabinet": 0.15, "kitchen_sink": 0.3,
     "cooker": 0.2, "built_in_cooker": 0.2, "dishwasher": 0.2, "fridge": 0.1, "washing_machine": 0.2,
@@ -24,8 +24,8 @@ _CLOSED = {
 
 
 def shapes_of(name: str, n: int = 4) -> list[Shape]:
-    own = [p for p in family_pieces() if p.id.startswith(f"generated#{name}-")]
-    return [family_shape(p) for p in own[:n]]
+    pieces = [p for p in family_pieces() if p.id.startswith(f"generated#{name}-")]
+    return [family_shape(p) for p in pieces[:n]]
 
 
 def points_of(surfaces: list[Surface]) -> np.ndarray:
@@ -33,7 +33,7 @@ def points_of(surfaces: list[Surface]) -> np.ndarray:
 
 
 def moved(shape: Shape, joint: Joint) -> tuple[np.ndarray, np.ndarray]:
-    """The points of a part, shut and wide open."""
+    """The points of a part when shut and wide open."""
     shut = points_of([s for s in shape.surfaces if s.part == joint.part])
     return shut, transform_points(joint.motion(joint.upper), shut)
 
@@ -52,11 +52,11 @@ def test_every_front_is_a_joint_that_opens_to_the_front(name: str) -> None:
                 continue
             assert wide[:, 2].mean() > shut[:, 2].mean() + 0.02, joint
             if joint.kind is JointKind.REVOLUTE:
-                # It hangs at an edge of its front: the axis lies in the part's own box.
-                at, own = np.array(joint.point), np.abs(joint.axis) < 0.5
+                # The hinge is at an edge of its front: the axis is inside the part's box.
+                pivot, is_across = np.array(joint.point), np.abs(joint.axis) < 0.5
                 low, high = shut.min(0) - 0.008, shut.max(0) + 0.008
-                assert ((at >= low) & (at <= high))[own].all(), joint
-                # Nothing of it dives into the body: the front's plane stays the hindmost.
+                assert ((pivot >= low) & (pivot <= high))[is_across].all(), joint
+                # No part of it enters the body: the front's plane stays the hindmost.
                 assert wide[:, 2].min() > shut[:, 2].max() - 0.14, joint
 
 
@@ -69,10 +69,10 @@ def test_behind_an_opened_front_is_an_inside(name: str) -> None:
         )
         for joint in shape.joints:
             if name == "washing_machine" and joint.part == "drawer 1":
-                continue  # what holds soap comes out of a panel
+                continue  # a soap dispenser protrudes from a panel
             shut, _wide = moved(shape, joint)
             low, high = shut.min(0), shut.max(0)
-            # Look in over a fine grid of places in the front's middle; the deepest sight counts.
+            # Look inside through a grid of points in the front's middle; the deepest counts.
             share = np.linspace(0.3, 0.7, 9)
             x, y = np.meshgrid(
                 low[0] + share * (high[0] - low[0]), low[1] + share * (high[1] - low[1])
@@ -82,7 +82,7 @@ def test_behind_an_opened_front_is_an_inside(name: str) -> None:
             hit = mesh.ray.intersects_first(eyes, ways)
             locations, _rays, _ = mesh.ray.intersects_location(eyes, ways, multiple_hits=False)
             assert (hit >= 0).any()
-            # Fronts end within 10 cm of what stands out of them most.
+            # Fronts end within 10 cm of the most protruding point.
             depth = high[2] - locations[:, 2].min()
             assert depth > _CLOSED[name], (joint, depth)
 
@@ -92,8 +92,8 @@ def test_a_drawer_has_a_bottom_two_sides_and_a_back() -> None:
     drawers = [joint for joint in shape.joints if joint.part.startswith("drawer")]
     assert drawers
     for joint in drawers:
-        own = [s for s in shape.surfaces if s.part == joint.part]
-        corners = np.concatenate([s.positions[s.faces] for s in own]).astype(np.float64)
+        surfaces = [s for s in shape.surfaces if s.part == joint.part]
+        corners = np.concatenate([s.positions[s.faces] for s in surfaces]).astype(np.float64)
         low, high = corners.min((0, 1)), corners.max((0, 1))
         middle = (low + high) / 2
         mesh = trimesh.Trimesh(corners.reshape(-1, 3), np.arange(len(corners) * 3).reshape(-1, 3))
@@ -103,7 +103,7 @@ def test_a_drawer_has_a_bottom_two_sides_and_a_back() -> None:
         assert not mesh.ray.intersects_any([inside], [[0, 1, 0]]).any(), "open above"
 
 
-def test_families_with_fronts_are_all_known_here() -> None:
+def test_families_with_fronts_are_all_listed_here() -> None:
     with_joints = {
         name
         for name in families()
@@ -120,7 +120,7 @@ def test_families_with_fronts_are_all_known_here() -> None:
     }
 
 
-def test_a_shut_toilets_lid_stands_up_before_its_cistern_over_an_open_bowl() -> None:
+def test_a_toilets_lid_opens_upright_before_its_cistern_over_an_open_bowl() -> None:
     shut = [shape for shape in shapes_of("toilet", 12) if shape.joints]
     assert len(shut) >= 4
     for shape in shut:
@@ -135,7 +135,7 @@ def test_a_shut_toilets_lid_stands_up_before_its_cistern_over_an_open_bowl() -> 
         eye = [0.0, low[:, 1].max() + 0.2, low[:, 2].mean()]
         (place, *_), _, _ = mesh.ray.intersects_location([eye], [[0, -1.0, 0]], multiple_hits=False)
         assert low[:, 1].min() - place[1] > 0.12
-        # Upright, it leans at nothing: backwards from each of its points there is a gap, or nothing.
+        # The upright lid touches nothing: behind each of its points is a gap, or nothing.
         back = wide[wide[:, 2] < wide[:, 2].min() + 0.02]
         hit, rays, _ = mesh.ray.intersects_location(back, np.tile([0, 0, -1.0], (len(back), 1)))
         assert (back[rays][:, 2] - hit[:, 2] > 0.001).all()
@@ -167,5 +167,5 @@ def test_a_microwave_has_a_door_and_a_plate_in_a_space_behind_it() -> None:
         mesh = trimesh.Trimesh(body.reshape(-1, 3), np.arange(3 * len(body)).reshape(-1, 3))
         low, high = shut.min(0), shut.max(0)
         eye = [[*((low + high) / 2)[:2], high[2] + 0.3]]
-        at, _rays, _ = mesh.ray.intersects_location(eye, [[0, 0, -1.0]], multiple_hits=False)
-        assert high[2] - at[0, 2] > 0.2
+        points, _rays, _ = mesh.ray.intersects_location(eye, [[0, 0, -1.0]], multiple_hits=False)
+        assert high[2] - points[0, 2] > 0.2

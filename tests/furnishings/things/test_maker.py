@@ -1,4 +1,4 @@
-"""What is added to a maker gets the material and the place of what is around it."""
+"""Solids added to a maker get the material and transform of their context."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def _low(solid: Surface) -> Triple:
     return (x, y, z)
 
 
-def test_the_nearest_material_holds_unless_a_solid_names_its_own() -> None:
+def test_the_nearest_material_applies_unless_a_solid_names_another() -> None:
     m = _maker()
     with m.of(STEEL):
         m.add(_cube())
@@ -42,7 +42,7 @@ def test_the_nearest_material_holds_unless_a_solid_names_its_own() -> None:
     assert [material for _solid, material in m.finished("file", "name")] == [STEEL, WHITE, BRASS]
 
 
-def test_what_is_moved_together_is_turned_and_then_shifted() -> None:
+def test_solids_moved_together_are_turned_and_then_shifted() -> None:
     m = _maker()
     quarter = rotation_y(np.pi / 2)
     with m.of(STEEL), m.moved(at=(0.0, 2.0, 0.0)):
@@ -55,7 +55,7 @@ def test_what_is_moved_together_is_turned_and_then_shifted() -> None:
     assert second == pytest.approx((0.0, 2.0, -6.0))
 
 
-def test_a_thing_is_made_of_what_its_function_takes() -> None:
+def test_an_item_has_the_parameters_of_its_function() -> None:
     @thing(group="box", place=Place.FLOOR)
     def block(m: Maker, edge: float) -> None:
         m.name = "small_block" if edge < 0.5 else ""
@@ -68,7 +68,7 @@ def test_a_thing_is_made_of_what_its_function_takes() -> None:
     assert block.make(np.random.default_rng(1), _STYLE, 1.0)[0].name == "Block"
 
 
-def test_a_solid_without_a_material_is_an_error_that_names_the_thing() -> None:
+def test_a_solid_without_a_material_is_an_error_that_names_the_item() -> None:
     @thing(group="box")
     def bare(m: Maker) -> None:
         m.add(_cube())

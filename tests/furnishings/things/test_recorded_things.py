@@ -1,4 +1,4 @@
-"""Every generated thing and family has the shape that recorded_things.csv records for two seeds.
+"""Every generated item and family has the shape that recorded_things.csv records for two seeds.
 
 `python -m tests.furnishings.things.test_recorded_things` writes the file anew, after a change that is meant. If
 families change, raise their VERSION first: the digest of dressed homes contains it, not the code.
@@ -28,7 +28,7 @@ _NAMES = [
 ]
 
 
-def _made(name: str, seed: int) -> Model:
+def _model(name: str, seed: int) -> Model:
     kind, _, key = name.partition(" ")
     rng, style = np.random.default_rng(seed), style_for(np.random.default_rng(seed + 100))
     if kind == "thing":
@@ -49,7 +49,7 @@ def _digest(model: Model) -> str:
     text.update(repr([(j.part, j.kind.name, j.axis) for j in shape.joints]).encode())
     for surface in shape.surfaces:
         text.update(repr((surface.material, surface.part, len(surface.faces))).encode())
-        # Steps that no measure is a multiple of: processors round the last bit differently.
+        # Steps of which no dimension is a multiple: processors round the last bit differently.
         steps = np.floor(surface.positions.astype(np.float64) / (1e-4 * np.pi) + 0.37)
         text.update(steps.astype(np.int32).tobytes())
     return text.hexdigest()[:12]
@@ -66,12 +66,12 @@ def test_every_thing_and_family_is_recorded_with_the_version_of_families() -> No
 
 
 @pytest.mark.parametrize("name", _NAMES)
-def test_a_thing_has_its_recorded_shape(name: str) -> None:
-    assert [_digest(_made(name, seed)) for seed in range(2)] == _recorded()[name]
+def test_an_item_has_its_recorded_shape(name: str) -> None:
+    assert [_digest(_model(name, seed)) for seed in range(2)] == _recorded()[name]
 
 
 if __name__ == "__main__":
-    made = {name: [_digest(_made(name, seed)) for seed in range(2)] for name in _NAMES}
+    made = {name: [_digest(_model(name, seed)) for seed in range(2)] for name in _NAMES}
     before = _recorded()
     changed = [n for n, row in made.items() if n.startswith("family ") and before.get(n) != row]
     if changed and before.get("version") == [str(VERSION)]:

@@ -1,4 +1,4 @@
-"""Generated things are closed, stand on their base and have the size of real ones."""
+"""Generated items are closed, rest on their base and have realistic sizes."""
 
 from __future__ import annotations
 
@@ -36,7 +36,7 @@ def _hold(made: Model, most_faces: int = 1500) -> None:
 
 
 @pytest.mark.parametrize("name", sorted(THINGS))
-def test_a_thing_is_closed_and_stands_on_its_base(name: str) -> None:
+def test_an_item_is_closed_and_rests_on_its_base(name: str) -> None:
     for seed in range(6):
         _hold(THINGS[name].make(np.random.default_rng(seed), _STYLE))
 
@@ -46,17 +46,17 @@ def test_a_thing_is_closed_and_stands_on_its_base(name: str) -> None:
     [("cup", 0.05, 0.16), ("bottle", 0.17, 0.33), ("laptop", 0.15, 0.3), ("plates", 0.015, 0.06),
      ("cushion", 0.1, 0.16), ("vase", 0.1, 0.67), ("remote", 0.01, 0.03)],
 )  # fmt: skip
-def test_a_thing_is_as_high_as_a_real_one(name: str, least: float, most: float) -> None:
+def test_an_item_has_a_realistic_height(name: str, least: float, most: float) -> None:
     for seed in range(6):
         piece, _ = THINGS[name].make(np.random.default_rng(seed), _STYLE)
         assert least <= piece.size[2] <= most
 
 
-def test_books_stand_side_by_side_in_the_length_there_is() -> None:
+def test_books_side_by_side_fill_the_given_length() -> None:
     for seed in range(8):
-        made, last = books.run_of_books(np.random.default_rng(seed), _COVERS, 0.6, 0.24, 0.2)
-        _hold(made)
-        piece, shape = made
+        books_made, last = books.run_of_books(np.random.default_rng(seed), _COVERS, 0.6, 0.24, 0.2)
+        _hold(books_made)
+        piece, shape = books_made
         assert piece.nyu40 == 23
         assert 0.3 < piece.size[0] <= 0.6 + 1e-6
         assert piece.size[1] <= 0.25
@@ -68,18 +68,18 @@ def test_books_stand_side_by_side_in_the_length_there_is() -> None:
 
 
 def test_a_short_gap_still_takes_a_book() -> None:
-    made, _ = books.run_of_books(np.random.default_rng(0), _COVERS, 0.008, 0.2, 0.2)
-    assert made[0].size[0] <= 0.008 + 1e-6
+    books_made, _ = books.run_of_books(np.random.default_rng(0), _COVERS, 0.008, 0.2, 0.2)
+    assert books_made[0].size[0] <= 0.008 + 1e-6
 
 
 def test_stacks_and_single_books_are_closed() -> None:
     rng = np.random.default_rng(3)
-    for made in (
+    for shape in (
         books.stack_of_books(rng, _COVERS, 1), books.stack_of_books(rng, _COVERS, 5),
         books.leaning_book(rng, _COVERS, 0.2, 0.2), books.magazines(rng, _COVERS, 3),
         books.open_book(rng, _COVERS),
     ):  # fmt: skip
-        _hold(made)
+        _hold(shape)
 
 
 def test_a_leaning_book_leans_on_its_left_neighbour_below_its_top() -> None:
@@ -90,7 +90,7 @@ def test_a_leaning_book_leans_on_its_left_neighbour_below_its_top() -> None:
     assert touching[:, 1].min() > 0.1
 
 
-def test_every_cell_of_the_covers_lies_in_the_picture() -> None:
+def test_every_cell_of_the_covers_is_in_the_picture() -> None:
     for cell in range(N_CELLS):
         for box in (_COVERS.spine(cell), _COVERS.pages(cell), _COVERS.board(cell),
                     _COVERS.paper(cell), _COVERS.front(cell)):  # fmt: skip
@@ -102,13 +102,13 @@ def test_the_same_seed_gives_the_same_bits() -> None:
     again = book_covers(np.random.default_rng(2), _STYLE)
     assert again.texture == _COVERS.texture
     for name in THINGS:
-        one, two = (THINGS[name].make(np.random.default_rng(7), _STYLE) for _ in range(2))
-        assert one[0] == two[0], name
-        assert one[1].surfaces[0].positions.tobytes() == two[1].surfaces[0].positions.tobytes()
+        first, two = (THINGS[name].make(np.random.default_rng(7), _STYLE) for _ in range(2))
+        assert first[0] == two[0], name
+        assert first[1].surfaces[0].positions.tobytes() == two[1].surfaces[0].positions.tobytes()
 
 
 def test_a_jar_is_clear_in_its_middle_and_dark_at_its_outline() -> None:
-    # Light goes through two walls, each with two faces; where it meets them at 70 degrees, on a longer way.
+    # Light passes two walls with two faces each; at 70 degrees its path is longer.
     kd = ((np.array(CLEAR.diffuse) + 0.055) / 1.055) ** 2.4
     passed = (1 - CLEAR.opacity * (1 - kd)) ** 4
     outline = passed ** (1 / np.cos(np.radians(70)))

@@ -50,7 +50,7 @@ _PLACES = {
 
 @cache
 def plain_catalogue() -> Catalogue:
-    """Boxes of every group that rooms need; no shapes."""
+    """A catalogue of boxes of every group that rooms need; no shapes."""
     pieces = tuple(
         Piece(
             f"plain#{group}{k}",

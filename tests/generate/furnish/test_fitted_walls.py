@@ -1,4 +1,4 @@
-"""Walls that are filled from side to side: which stretches are free, and what fills them."""
+"""Walls filled from side to side: the free stretches, and the pieces that fill them."""
 
 from __future__ import annotations
 
@@ -45,8 +45,8 @@ def room() -> FurnishSpace:
 
 def test_a_stretch_ends_at_doors_windows_and_corners() -> None:
     beside_door, beside_window = (W - DOOR_M) / 2, (W - WINDOW_M) / 2
-    found = free_stretches(room(), 0.5)
-    assert found == pytest.approx((D, beside_door, beside_window), abs=0.03)
+    stretches = free_stretches(room(), 0.5)
+    assert stretches == pytest.approx((D, beside_door, beside_window), abs=0.03)
     assert free_stretches(room(), 2.0) == pytest.approx((D,), abs=0.03)
 
 
@@ -71,7 +71,7 @@ def test_a_row_of_doors_is_stretched_from_wall_to_wall() -> None:
         assert min(x0, W - x1) < 0.03
 
 
-def test_a_stretch_that_no_piece_is_near_stays_as_it_is() -> None:
+def test_a_stretch_far_from_all_pieces_is_unchanged() -> None:
     assert fitted_wardrobes(shelf(1.2), (D,)) == ()
 
 
@@ -86,13 +86,13 @@ def table_and_chairs(width: float) -> Shelf:
 @pytest.mark.parametrize(
     ("width", "seats", "chairs"), [(1.8, 8, 8), (1.8, 6, 6), (1.4, 6, 6), (1.4, 4, 4)]
 )
-def test_a_long_table_has_somebody_at_either_end_where_so_many_are_asked_for(
+def test_a_long_table_has_a_chair_at_each_end_if_enough_are_requested(
     width: float, seats: int, chairs: int
 ) -> None:
     best = max(dining(table_and_chairs(width), seats), key=lambda t: t.rank)
     seated = [s for s in best.slots if s.piece.group == "chair"]
     assert len(seated) == chairs
-    # Those at the ends look along the table, and reach under it.
+    # Chairs at the ends face along the table, and reach under it.
     ends = [s for s in seated if s.turns % 2]
     assert len(ends) == (2 if (width, seats) in ((1.8, 8), (1.4, 6)) else 0)
     assert all(abs(s.u) - s.depth / 2 == pytest.approx(width / 2 - 0.2) for s in ends)

@@ -1,4 +1,4 @@
-"""Furnished plans: what every one of them meets."""
+"""Rules that every furnished plan satisfies."""
 
 from __future__ import annotations
 
@@ -56,7 +56,7 @@ def test_a_television_looks_at_the_sofa_from_two_to_three_and_a_half_metres(seed
 
 @pytest.mark.quick(1)
 @pytest.mark.parametrize("seed", SEEDS)
-def test_wall_cabinets_hang_at_a_metre_forty_five_and_lamps_from_the_ceiling(seed: int) -> None:
+def test_wall_cabinets_hang_at_145_cm_and_lamps_from_the_ceiling(seed: int) -> None:
     plan, pieces = home(seed)
     assert all(p.elevation == 1.45 for p in pieces if p.piece.group == "upper_cabinet")
     lamps = [p for p in pieces if p.piece.group == "ceiling_lamp"]

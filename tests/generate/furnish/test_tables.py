@@ -1,4 +1,4 @@
-"""Chairs at tables: as far under the top as both allow."""
+"""Chairs at tables are as far under the top as both allow."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def shape_of(*boxes: tuple[tuple[float, float, float], tuple[float, float, float
 
 
 def shelf(w: float, d: float, apron: float) -> Shelf:
-    """A table whose top hangs down by its apron, 3 cm within its edge; a chair with arms 65 cm high."""
+    """A table with an apron 3 cm inside its edge; a chair with arms 65 cm high."""
     table = Piece("t", "table", "dining_table", Place.FLOOR, 7, (w, d, 0.75))
     chair = Piece("c", "chair", "chair", Place.FLOOR, 5, (0.45, 0.5, 0.9))
     inset = (w / 2 - 0.03, d / 2 - 0.03)
@@ -43,7 +43,7 @@ def shelf(w: float, d: float, apron: float) -> Shelf:
 
 @pytest.mark.parametrize(
     ("apron", "under"),
-    # Arms 5 cm behind the seat's front pass below a thin top, and stop 4 mm before a deep apron.
+    # Arms 5 cm behind the seat's front pass below a thin top, and end 4 mm before a deep apron.
     [(0.02, 0.2), (0.15, 0.03 + 0.05 - 0.004)],
 )
 @pytest.mark.parametrize("at_wall", [False, True])

@@ -1,4 +1,4 @@
-"""The built-in home: whole, labelled, and with something for repair to do."""
+"""The built-in home is complete and labelled, and repair has work to do in it."""
 
 from __future__ import annotations
 
@@ -68,7 +68,7 @@ def test_every_room_has_objects_enough_for_cameras_and_light() -> None:
         assert any(i.kind is ItemKind.WINDOW for i in inside)
 
 
-def test_every_piece_stands_in_the_room_it_names_and_above_its_floor() -> None:
+def test_every_piece_is_in_the_room_it_names_and_above_its_floor() -> None:
     for thing in of(ItemKind.OBJECT, ItemKind.LAMP, ItemKind.PLANT):
         room = HOME.room(thing.room_id or "")
         outline = shapely.Polygon(room.polygon).buffer(1e-6)
@@ -84,7 +84,7 @@ def test_it_has_a_pane_a_mirror_a_glass_a_plant_and_a_lamp_without_a_bulb() -> N
     assert sorted(len(i.lights[0].emitting) for i in of(ItemKind.LAMP)) == [0, 1]
 
 
-def test_a_bulb_lies_about_its_light() -> None:
+def test_a_bulb_encloses_its_light() -> None:
     (lamp,) = [i for i in of(ItemKind.LAMP) if i.lights[0].emitting]
     light = lamp.lights[0]
     bulb = lamp.surfaces[light.emitting[0]]

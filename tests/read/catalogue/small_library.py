@@ -49,11 +49,11 @@ def library_bytes(
     lines = [f"{key}={value}" for key, value in head.items()]
     for number, row in enumerate(entries, 1):
         lines += [f"{key}#{number}={value}" for key, value in row.items()]
-    held = {"wedge/wedge.obj": WEDGE_OBJ, "wedge/wedge.mtl": WEDGE_MTL} | dict(contents or {})
+    members = {"wedge/wedge.obj": WEDGE_OBJ, "wedge/wedge.mtl": WEDGE_MTL} | dict(contents or {})
     buffer = io.BytesIO()
     with zipfile.ZipFile(buffer, "w") as archive:
         archive.writestr(catalogue, "\n".join(lines))
-        for name, data in held.items():
+        for name, data in members.items():
             archive.writestr(name, data)
     return buffer.getvalue()
 

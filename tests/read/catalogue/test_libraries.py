@@ -28,7 +28,7 @@ def test_a_piece_stands_on_its_base_in_metres_with_its_back_behind(tmp_path: Pat
     assert (top[:, 2] < -0.19).all()
 
 
-def test_what_hangs_on_a_wall_has_its_back_on_it(tmp_path: Path) -> None:
+def test_the_back_of_a_wall_piece_is_on_the_wall(tmp_path: Path) -> None:
     shape = _shape(catalogue_from([library(tmp_path, [entry("Mirror", (60, 4, 90))])]), "Mirror")
     np.testing.assert_allclose(shape.bounds[:, 2], [0, 0.04], atol=1e-6)
 
@@ -53,14 +53,14 @@ def test_a_lamp_keeps_its_light_sources(tmp_path: Path) -> None:
     assert light.rgb_linear[2] == 0.0
 
 
-def test_panes_mirrors_and_lights_are_known_by_their_groups(tmp_path: Path) -> None:
+def test_group_names_mark_panes_mirrors_and_lights(tmp_path: Path) -> None:
     model = WEDGE_OBJ.replace(b"f 2 3 6", b"g sweethome3d_window_mirror\nf 2 3 6")
     path = library(tmp_path, [entry("Dresser")], contents={"wedge/wedge.obj": model})
     kinds = {m.kind for m in _shape(catalogue_from([path]), "Dresser").materials}
     assert MaterialKind.MIRROR in kinds
 
 
-def test_a_piece_says_who_made_it_and_under_which_licence(tmp_path: Path) -> None:
+def test_a_piece_names_its_author_and_licence(tmp_path: Path) -> None:
     (piece,) = catalogue_from([library(tmp_path, [entry("Dresser")])]).pieces
     assert (piece.library, piece.creator, piece.licence) == ("Small", "Someone", "CC-BY 3.0")
     assert piece.size == (0.8, 0.4, 0.9)
@@ -74,17 +74,17 @@ def test_the_digest_changes_with_a_library_and_with_nothing_else(tmp_path: Path)
     assert catalogue_from([path]).digest != first
 
 
-def test_what_is_the_users_own_is_known_and_a_package_s_is_not(tmp_path: Path) -> None:
-    package, own = tmp_path / "package.sh3f", tmp_path / "own.sh3f"
+def test_the_users_own_libraries_are_distinguished_from_packages(tmp_path: Path) -> None:
+    package, own_library = tmp_path / "package.sh3f", tmp_path / "own.sh3f"
     package.write_bytes(library_bytes([entry("Chest one"), entry("Chest two")]))
-    own.write_bytes(library_bytes([entry("Chest two"), entry("Chest three")]))
+    own_library.write_bytes(library_bytes([entry("Chest two"), entry("Chest three")]))
     assert catalogue_from([package]).own == frozenset()
-    found = catalogue_from([package], given=[own])
-    assert {piece.split("#")[1] for piece in found.own} == {"chest-two", "chest-three"}
-    assert found.own < {piece.id for piece in found.pieces}
+    libraries = catalogue_from([package], given=[own_library])
+    assert {piece.split("#")[1] for piece in libraries.own} == {"chest-two", "chest-three"}
+    assert libraries.own < {piece.id for piece in libraries.pieces}
 
 
-def test_what_is_wrong_with_an_entry_becomes_a_note_and_the_rest_goes_on(tmp_path: Path) -> None:
+def test_a_wrong_entry_becomes_a_note_and_the_others_are_read(tmp_path: Path) -> None:
     rows = [
         entry("Dresser"),
         entry("Bed", model="/gone.obj"),
@@ -117,14 +117,14 @@ def test_a_damaged_library_of_the_packages_becomes_a_note(tmp_path: Path, data: 
         catalogue_from([], given=[path])
 
 
-def test_a_library_of_one_s_own_without_a_known_class_is_refused(tmp_path: Path) -> None:
+def test_a_users_library_without_a_known_class_is_refused(tmp_path: Path) -> None:
     path = library(tmp_path, [entry("Zzz")])
     assert [n.kind for n in catalogue_from([path]).notes] == ["no-classes"]
     with pytest.raises(BadInput, match=r"no usable piece or picture \(no piece"):
         catalogue_from([], given=[path])
 
 
-def test_a_catalogue_that_does_not_exist_is_one_clear_line(tmp_path: Path) -> None:
+def test_a_missing_catalogue_is_reported_in_one_line(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="no such file or folder"):
         catalogue_from([], given=[tmp_path / "none.sh3f"])
 

@@ -29,7 +29,7 @@ def test_a_heavy_shape_gets_light_and_keeps_its_size() -> None:
     assert_allclose(lighter.bounds, heavy.bounds, atol=1e-6)
 
 
-def test_its_surface_and_its_shading_stay_near_what_they_were() -> None:
+def test_its_surface_and_its_shading_hardly_change() -> None:
     (surface,) = lighter_shape(_ball(), 3000, 1 / 20).surfaces
     assert surface.normals is not None
     radius = np.linalg.norm(surface.positions - [0, 0.5, 0], axis=1)
@@ -40,7 +40,7 @@ def test_its_surface_and_its_shading_stay_near_what_they_were() -> None:
     assert_allclose(area, np.pi, rtol=0.03)
 
 
-def test_a_light_shape_comes_back_as_it_is() -> None:
+def test_a_light_shape_is_unchanged() -> None:
     shape = _ball(12)
     assert lighter_shape(shape, 3000, 1 / 20) is shape
 
@@ -50,7 +50,7 @@ def test_a_shape_that_stays_heavy_is_as_light_as_it_may_get() -> None:
     assert 1000 < _n_faces(lighter) < _n_faces(_ball())
 
 
-def test_surfaces_keep_their_number_and_what_touched_still_touches() -> None:
+def test_surfaces_keep_their_number_and_touching_parts_still_touch() -> None:
     heavy = _ball()
     half = len(heavy.surfaces[0].faces) // 2
     upper = replace(heavy.surfaces[0], faces=heavy.surfaces[0].faces[half:])
@@ -58,5 +58,5 @@ def test_surfaces_keep_their_number_and_what_touched_still_touches() -> None:
     tiny = box("tiny", np.array([0.0, 0.5, 0.0]), np.full(3, 1e-4), 0)
     parts = lighter_shape(replace(heavy, surfaces=(upper, tiny, lower)), 3000, 1 / 20).surfaces
     assert len(parts) == 3
-    one, two = ({tuple(p) for p in s.positions[np.unique(s.faces)]} for s in (parts[0], parts[2]))
-    assert len(one & two) > 20
+    first, two = ({tuple(p) for p in s.positions[np.unique(s.faces)]} for s in (parts[0], parts[2]))
+    assert len(first & two) > 20

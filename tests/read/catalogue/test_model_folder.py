@@ -21,7 +21,7 @@ def write(path: Path, data: bytes = WEDGE_OBJ) -> None:
     (path.parent / "wedge.mtl").write_bytes(WEDGE_MTL)
 
 
-def test_the_folder_of_a_model_says_what_it_is(tmp_path: Path) -> None:
+def test_the_folder_of_a_model_gives_its_class(tmp_path: Path) -> None:
     write(tmp_path / "sofa" / "kivik.obj")
     catalogue = catalogue_from([], given=[tmp_path])
     (piece,) = catalogue.of("sofa")
@@ -68,7 +68,7 @@ def test_an_empty_folder_is_no_catalogue(tmp_path: Path) -> None:
         catalogue_from([], given=[tmp_path])
 
 
-def test_a_folder_of_which_nothing_can_be_used_says_why(tmp_path: Path) -> None:
+def test_a_folder_without_usable_models_reports_why(tmp_path: Path) -> None:
     (tmp_path / "sofa.glb").write_bytes(b"junk")
     with pytest.raises(BadInput, match="no usable piece or picture") as caught:
         catalogue_from([], given=[tmp_path])
@@ -83,7 +83,7 @@ def test_the_digest_follows_every_file_of_the_folder(tmp_path: Path) -> None:
 
 
 def box_glb(width: float, height: float, depth: float) -> bytes:
-    """A box from the origin on."""
+    """A box with one corner at the origin."""
     scene = Scene()
     scene.materials.append({"name": "wood"})
     return scene.glb([scene.node("thing", mesh=scene.box([0, 0, 0], [width, height, depth], 0))])
@@ -98,18 +98,18 @@ def kinds(folder: Path) -> list[str]:
     return sorted(note.kind for note in catalogue_from([], given=[folder]).notes)
 
 
-def test_3d_future_is_known_by_its_table_and_by_its_raw_models(tmp_path: Path) -> None:
+def test_3d_future_is_recognised_by_its_table_and_by_its_raw_models(tmp_path: Path) -> None:
     rows = [
         {"model_id": "a1", "super-category": "Sofa", "category": "Loveseat Sofa"},
         {"model_id": "b2", "super-category": "Cabinet/Shelf/Desk", "category": "Nightstand"},
         {"model_id": "c3", "super-category": "Bed", "category": "King-size Bed"},
     ]
     (tmp_path / "model_info.json").write_text(json.dumps(rows))
-    for one in ("a1", "b2"):
-        write(tmp_path / one / "raw_model.obj")
-        write(tmp_path / one / "normalized_model.obj")
+    for key in ("a1", "b2"):
+        write(tmp_path / key / "raw_model.obj")
+        write(tmp_path / key / "normalized_model.obj")
     catalogue = catalogue_from([], given=[tmp_path])
-    # A nightstand of 2 m is none, and the bed is not there.
+    # The nightstand is 2 m high and loses its class; the bed has no model file.
     assert [(p.id, p.group) for p in catalogue.pieces] == [
         (f"{tmp_path.name}#a1/raw_model", "sofa")
     ]
@@ -119,7 +119,7 @@ def test_3d_future_is_known_by_its_table_and_by_its_raw_models(tmp_path: Path) -
     )
 
 
-def test_hssd_models_are_turned_to_the_front_that_their_configuration_tells(tmp_path: Path) -> None:
+def test_hssd_models_are_turned_to_the_front_of_their_configuration(tmp_path: Path) -> None:
     (tmp_path / "objects.csv").write_text("id,name,main_category\nab12,x,bookcase\n")
     put(tmp_path / "objects/a/ab12.glb", box_glb(0.3, 1.8, 0.9))
     put(tmp_path / "objects/a/ab12.collider.glb", box_glb(9, 9, 9))
@@ -142,7 +142,7 @@ def test_a_front_to_the_right_comes_to_the_front_and_the_back_to_the_back(tmp_pa
     shape = catalogue.shape(piece)
     assert shape is not None
     points = np.concatenate([s.positions for s in shape.surfaces])
-    # What looked to -z looks to +x where +x has become the front: the tall side is at +x.
+    # The model's -z becomes +x when +x is declared as its front: the tall side is at +x.
     assert np.allclose(points[points[:, 1] > 0.5][:, 0], 1.0)
 
 
@@ -177,26 +177,26 @@ def test_a_model_of_another_unit_is_scaled_and_one_of_no_size_is_refused(
     assert [n.text for n in catalogue.notes] == [f"is in {found}"]
 
 
-def test_a_folder_is_indexed_once_and_anew_where_a_file_changes(
+def test_a_folder_is_indexed_once_and_again_if_a_file_changes(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    own, store = tmp_path / "own", tmp_path / "store"
-    put(own / "armchair" / "a.glb", box_glb(0.8, 0.9, 0.8))
-    put(own / "armchair" / "b.glb", b"junk")
-    first = catalogue_from([], given=[own], store=store)
+    folder, store = tmp_path / "own", tmp_path / "store"
+    put(folder / "armchair" / "a.glb", box_glb(0.8, 0.9, 0.8))
+    put(folder / "armchair" / "b.glb", b"junk")
+    first = catalogue_from([], given=[folder], store=store)
     with monkeypatch.context() as patch:
-        patch.setattr(folders, "_index", lambda *_: pytest.fail("indexed again"))
+        patch.setattr(folders, "index_models", lambda *_: pytest.fail("indexed again"))
         patch.setattr(folders, "digest_of_regular", lambda _: pytest.fail("digested again"))
-        again = catalogue_from([], given=[own], store=store)
+        again = catalogue_from([], given=[folder], store=store)
     assert (again.pieces, again.digest, again.notes) == (first.pieces, first.digest, first.notes)
     (index,) = store.glob("index-*.json")
     index.write_bytes(b"[1")
-    assert catalogue_from([], given=[own], store=store).pieces == first.pieces
-    put(own / "armchair" / "c.glb", box_glb(0.7, 0.9, 0.8))
-    assert len(catalogue_from([], given=[own], store=store).pieces) == 2
+    assert catalogue_from([], given=[folder], store=store).pieces == first.pieces
+    put(folder / "armchair" / "c.glb", box_glb(0.7, 0.9, 0.8))
+    assert len(catalogue_from([], given=[folder], store=store).pieces) == 2
 
 
-def test_a_glb_is_measured_by_the_bounds_that_it_tells(
+def test_a_glb_is_measured_by_its_declared_bounds(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     put(tmp_path / "armchair" / "a.glb", box_glb(0.8, 0.9, 0.7))
@@ -205,7 +205,7 @@ def test_a_glb_is_measured_by_the_bounds_that_it_tells(
     assert piece.size == pytest.approx((0.8, 0.7, 0.9))
 
 
-def test_a_glb_whose_nodes_go_round_is_refused(tmp_path: Path) -> None:
+def test_a_glb_with_a_cycle_of_nodes_is_refused(tmp_path: Path) -> None:
     scene = Scene()
     scene.nodes += [{"children": [1]}, {"children": [0]}]
     put(tmp_path / "armchair" / "round.glb", scene.glb([0]))
@@ -213,10 +213,10 @@ def test_a_glb_whose_nodes_go_round_is_refused(tmp_path: Path) -> None:
     assert kinds(tmp_path) == ["unusable-model"]
 
 
-def test_the_verb_says_what_is_used_and_writes_what_is_refused(
+def test_the_verb_lists_usable_models_and_writes_refused_ones(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pbrs_farm.prepare.dress_catalogue._store", lambda: tmp_path / "store")
+    monkeypatch.setenv("PBRS_CACHE", str(tmp_path / "cache"))
     put(tmp_path / "own" / "armchair" / "a.glb", box_glb(0.8, 0.9, 0.8))
     put(tmp_path / "own" / "armchair" / "huge.glb", box_glb(7, 9, 7))
     refused = tmp_path / "refused.csv"
@@ -228,10 +228,10 @@ def test_the_verb_says_what_is_used_and_writes_what_is_refused(
     assert refused.read_text().splitlines()[1].startswith("wrong-size,own#armchair/huge,")
 
 
-def test_the_verb_writes_what_is_refused_where_nothing_can_be_used(
+def test_the_verb_writes_refused_models_if_none_is_usable(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    monkeypatch.setattr("pbrs_farm.prepare.dress_catalogue._store", lambda: tmp_path / "store")
+    monkeypatch.setenv("PBRS_CACHE", str(tmp_path / "cache"))
     put(tmp_path / "own" / "armchair" / "huge.glb", box_glb(7, 9, 7))
     refused = tmp_path / "refused.csv"
     assert main(["catalogue", str(tmp_path / "own"), "--refused", str(refused)]) == 1

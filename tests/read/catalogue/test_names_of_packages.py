@@ -1,7 +1,7 @@
-"""The word table against what the program and Debian's furniture package call their own pieces.
+"""The word table against the names that the program and Debian's furniture package give their pieces.
 
-The program's own catalogue has a class for each of its ids; a piece of the furniture package is
-what its English name says, where that package is fetched. Each is named in eleven languages.
+The program's catalogue has a class for each id; the class of a package's piece is that of its
+English name, if the package was fetched. Each piece is named in eleven languages.
 """
 
 from __future__ import annotations
@@ -29,35 +29,35 @@ def _size(entry: dict[str, str]) -> PieceSize:
 
 
 def _class(name: str, size: PieceSize) -> int:
-    found = class_of_piece("", name, "", size).nyu40
-    return OTHERPROP if found is None else found
+    nyu40 = class_of_piece("", name, "", size).nyu40
+    return OTHERPROP if nyu40 is None else nyu40
 
 
 @cache
 def _named(language: str) -> tuple[tuple[str, int, PieceSize], ...]:
-    """Each piece's name in that language, its class and its size."""
-    return tuple(_found(language))
+    """Name, class and size of each piece in that language."""
+    return tuple(_entries(language))
 
 
-def _found(language: str) -> Iterator[tuple[str, int, PieceSize]]:
+def _entries(language: str) -> Iterator[tuple[str, int, PieceSize]]:
     resources = example_homes().resources()
     base = resources.read(f"{IN_JAR}.properties")
-    own = resources.read(f"{IN_JAR}_{language}.properties")
+    texts = resources.read(f"{IN_JAR}_{language}.properties")
     assert base is not None
-    assert own is not None
-    for entry, names in _pairs(base, own):
-        known = nyu40_of(entry["id"], "")
-        if known is not None and known != 0 and "texturable" not in entry["id"]:
-            yield names, known, _size(entry)
+    assert texts is not None
+    for entry, names in _pairs(base, texts):
+        nyu40 = nyu40_of(entry["id"], "")
+        if nyu40 is not None and nyu40 != 0 and "texturable" not in entry["id"]:
+            yield names, nyu40, _size(entry)
     package = furniture_package.cached()
     for library in package.libraries if package else ():
         with zipfile.ZipFile(library) as archive:
             base = archive.read(f"{IN_LIBRARY}.properties")
-            own = archive.read(f"{IN_LIBRARY}_{language}.properties")
-        for entry, name in _pairs(base, own):
-            said = class_of_piece("", entry["name"], "", _size(entry)).nyu40
-            if said is not None and name != entry["name"]:
-                yield name, said, _size(entry)
+            texts = archive.read(f"{IN_LIBRARY}_{language}.properties")
+        for entry, name in _pairs(base, texts):
+            name_nyu40 = class_of_piece("", entry["name"], "", _size(entry)).nyu40
+            if name_nyu40 is not None and name != entry["name"]:
+                yield name, name_nyu40, _size(entry)
 
 
 def _pairs(base: bytes, own: bytes) -> Iterator[tuple[dict[str, str], str]]:
@@ -72,13 +72,13 @@ def _pairs(base: bytes, own: bytes) -> Iterator[tuple[dict[str, str], str]]:
 
 @pytest.mark.homes
 @pytest.mark.parametrize("language", LANGUAGES)
-def test_pieces_are_what_their_own_names_say(language: str) -> None:
+def test_pieces_have_the_class_of_their_name(language: str) -> None:
     named = _named(language)
     assert len(named) >= 85
-    right = [_class(name, size) == known for name, known, size in named]
+    right = [_class(name, size) == nyu40 for name, nyu40, size in named]
     assert sum(right) >= 0.85 * len(named)
-    # A home's chief furniture is known nearly always.
-    chief = [k for k, (_n, known, _s) in enumerate(named) if NYU40_NAMES[known] in CHIEF]
+    # The main furniture of a home is nearly always recognised.
+    chief = [k for k, (_n, nyu40, _s) in enumerate(named) if NYU40_NAMES[nyu40] in CHIEF]
     assert sum(right[k] for k in chief) >= 0.9 * len(chief)
 
 
@@ -99,5 +99,5 @@ def test_pieces_are_what_their_own_names_say(language: str) -> None:
         ("Hanglamp", "lamp"),
     ],
 )
-def test_seats_and_doors_that_are_counted_name_no_thing(name: str, label: str) -> None:
+def test_counts_of_seats_and_doors_are_no_class(name: str, label: str) -> None:
     assert nyu40_of("", name) == NYU40_NAMES.index(label)

@@ -38,7 +38,7 @@ def test_another_photograph_is_another_catalogue(tmp_path: Path) -> None:
     assert catalogue_from([], given=[tmp_path]).digest != before
 
 
-def test_what_is_no_picture_is_a_note_and_an_empty_folder_one_line(tmp_path: Path) -> None:
+def test_an_undecodable_picture_is_a_note_and_an_empty_folder_an_error(tmp_path: Path) -> None:
     _write(tmp_path / "a.jpg", (80, 60))
     (tmp_path / "b.jpg").write_bytes(b"no picture")
     _write(tmp_path / "strip.png", (800, 10))

@@ -24,7 +24,7 @@ from pbrs_farm.read.catalogue.piece_groups import group_rule, group_rules, piece
         ("Armoire", "", (1.0, 0.6, 2.0), "wardrobe"),
     ],
 )
-def test_a_name_a_category_and_a_size_say_the_group(
+def test_name_category_and_size_give_the_group(
     name: str, category: str, size: tuple[float, float, float], group: str
 ) -> None:
     rule = group_rule(name, category, size)
@@ -42,7 +42,7 @@ def test_a_name_a_category_and_a_size_say_the_group(
         ("", "", (1.0, 1.0, 1.0)),
     ],
 )
-def test_what_stands_outside_or_is_unknown_has_no_group(
+def test_outdoor_and_unknown_models_have_no_group(
     name: str, category: str, size: tuple[float, float, float]
 ) -> None:
     assert group_rule(name, category, size) is None
@@ -63,7 +63,7 @@ def test_lamps_plants_doors_and_windows_are_of_their_kind() -> None:
     assert kinds["chair"] is ItemKind.OBJECT
 
 
-def test_what_hangs_on_walls_is_measured_along_them() -> None:
+def test_wall_pieces_are_measured_along_walls() -> None:
     rule = group_rule("Wall clock", "", (0.3, 0.03, 0.3))
     assert rule is not None
     assert rule.place is Place.WALL

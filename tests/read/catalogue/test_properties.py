@@ -7,13 +7,13 @@ def test_a_property_file_is_read_as_java_reads_it() -> None:
     text = (
         "# no\n! no\n\na = 1\nb:two words \nc three\nd=long \\\n   line\ne=\\u00e9\\t!\nf\\ g=x\n"
     )
-    found = parse_properties(text.encode())
-    assert found == {
+    properties = parse_properties(text.encode())
+    assert properties == {
         "a": "1", "b": "two words", "c": "three", "d": "long line", "e": "é\t!", "f g": "x",
     }  # fmt: skip
 
 
-def test_latin_1_is_read_where_utf_8_does_not_decode() -> None:
+def test_latin_1_is_read_if_utf_8_does_not_decode() -> None:
     assert parse_properties("a=é".encode("latin-1")) == parse_properties("a=é".encode())
 
 

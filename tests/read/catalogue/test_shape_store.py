@@ -31,17 +31,17 @@ def _never() -> Shape | None:
 
 
 def test_a_stored_shape_has_the_same_bits(tmp_path: Path) -> None:
-    store, made = ShapeStore(tmp_path / "s"), _shape()
-    assert store.shape(("a", 1), lambda: made) is made
+    store, shape = ShapeStore(tmp_path / "s"), _shape()
+    assert store.shape(("a", 1), lambda: shape) is shape
     again = store.shape(("a", 1), _never)
     assert again is not None
     assert (again.materials, again.textures, again.lights) == (
-        made.materials, made.textures, made.lights,
+        shape.materials, shape.textures, shape.lights,
     )  # fmt: skip
-    for one, two in zip(again.surfaces, made.surfaces, strict=True):
-        assert (one.name, one.material) == (two.name, two.material)
+    for surface, two in zip(again.surfaces, shape.surfaces, strict=True):
+        assert (surface.name, surface.material) == (two.name, two.material)
         for name in ("positions", "faces", "uvs", "normals"):
-            assert_array_equal(getattr(one, name), getattr(two, name))
+            assert_array_equal(getattr(surface, name), getattr(two, name))
 
 
 def test_a_model_that_cannot_be_used_is_not_tried_again(tmp_path: Path) -> None:
@@ -51,7 +51,7 @@ def test_a_model_that_cannot_be_used_is_not_tried_again(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("data", [b"", b"PK\3\4", b"nothing"])
-def test_a_damaged_file_is_made_anew(tmp_path: Path, data: bytes) -> None:
+def test_a_damaged_file_is_rebuilt(tmp_path: Path, data: bytes) -> None:
     store = ShapeStore(tmp_path)
     store.shape(("a",), _shape)
     (file,) = tmp_path.iterdir()
@@ -60,16 +60,16 @@ def test_a_damaged_file_is_made_anew(tmp_path: Path, data: bytes) -> None:
     assert store.shape(("a",), _never) is not None
 
 
-def test_a_folder_that_cannot_be_written_is_done_without(tmp_path: Path) -> None:
+def test_an_unwritable_folder_is_not_used(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("")
     assert ShapeStore(tmp_path / "file" / "below").shape(("a",), _shape) is not None
 
 
 def test_a_catalogue_with_a_store_gives_the_shapes_of_one_without(tmp_path: Path) -> None:
-    path, kept = library(tmp_path, [entry("Dresser")]), tmp_path / "kept"
+    path, shapes = library(tmp_path, [entry("Dresser")]), tmp_path / "kept"
     plain, first, second = (
         c.shape(c.pieces[0])
-        for c in (catalogue_from([path]), *(catalogue_from([path], store=kept) for _ in range(2)))
+        for c in (catalogue_from([path]), *(catalogue_from([path], store=shapes) for _ in range(2)))
     )
     assert plain is not None
     assert first is not None

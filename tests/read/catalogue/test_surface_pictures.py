@@ -30,18 +30,18 @@ def textures(folder: Path, rows: list[dict[str, str]], contents: dict[str, bytes
 
 def test_a_texture_library_gives_pictures_with_their_size(tmp_path: Path) -> None:
     path = textures(tmp_path, [row("Oak wood")], {"a.png": picture()})
-    (found,) = catalogue_from([], given=[path]).pictures
-    assert (found.group, found.size, found.licence) == ("wood", (0.6, 0.4), "CC-BY 3.0")
-    assert found.texture.data == picture()
+    (wood,) = catalogue_from([], given=[path]).pictures
+    assert (wood.group, wood.size, wood.licence) == ("wood", (0.6, 0.4), "CC-BY 3.0")
+    assert wood.texture.data == picture()
 
 
 def test_large_pictures_are_made_smaller(tmp_path: Path) -> None:
     path = textures(tmp_path, [row("Brick")], {"a.png": picture((2048, 1024))})
-    (found,) = catalogue_from([], given=[path]).pictures
-    assert Image.open(io.BytesIO(found.texture.data)).size == (1024, 512)
+    (smaller,) = catalogue_from([], given=[path]).pictures
+    assert Image.open(io.BytesIO(smaller.texture.data)).size == (1024, 512)
 
 
-def test_what_is_no_picture_becomes_a_note_and_the_rest_goes_on(tmp_path: Path) -> None:
+def test_an_undecodable_picture_becomes_a_note_and_the_others_are_read(tmp_path: Path) -> None:
     rows = [row("Oak wood"), row("Marble", "b.png"), row("Brick", "c.png"), row("Tile", width="x")]
     path = textures(tmp_path, rows, {"a.png": picture(), "b.png": b"no picture"})
     catalogue = catalogue_from([], given=[path])
@@ -79,5 +79,5 @@ def test_a_damaged_texture_library_is_refused(tmp_path: Path, data: bytes) -> No
         ("Grass", "Floor", ""),
     ],
 )
-def test_a_picture_is_of_what_its_name_says(name: str, category: str, group: str) -> None:
+def test_the_name_of_a_picture_gives_its_kind(name: str, category: str, group: str) -> None:
     assert surface_group(name, category) == group

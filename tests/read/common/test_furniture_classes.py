@@ -33,9 +33,7 @@ from pbrs_farm.read.common.furniture_classes import (
         ("eTeks#texturableBox", "Box", "otherprop"),
     ],
 )
-def test_a_piece_is_what_the_head_of_its_name_says(
-    catalogue_id: str, name: str, label: str
-) -> None:
+def test_the_head_noun_of_a_name_gives_the_class(catalogue_id: str, name: str, label: str) -> None:
     assert nyu40_of(catalogue_id, name) == NYU40_NAMES.index(label)
 
 
@@ -43,7 +41,7 @@ def test_a_bare_box_takes_its_groups_name() -> None:
     assert nyu40_of("eTeks#texturableBox", "Box", "Bed") == NYU40_NAMES.index("bed")
 
 
-def test_an_unknown_thing_has_no_class() -> None:
+def test_an_unknown_name_has_no_class() -> None:
     assert nyu40_of("", "Xyzzy") is None
 
 
@@ -58,7 +56,7 @@ def test_an_unknown_thing_has_no_class() -> None:
         ("", "Child swing", ItemKind.OBJECT),
     ],
 )
-def test_persons_plants_and_stairs_are_told_apart(
+def test_persons_plants_and_stairs_are_distinguished(
     catalogue_id: str, name: str, kind: ItemKind
 ) -> None:
     piece = class_of_piece(catalogue_id, name)
@@ -105,14 +103,14 @@ def test_a_name_is_read_by_whole_words_in_its_language(name: str, label: str) ->
         ("Xyzzy", PieceSize(1, 1, 1), None, "none"),
     ],
 )
-def test_size_and_place_refuse_what_the_words_say(
+def test_size_and_place_overrule_words(
     name: str, place: PieceSize, label: str | None, rule: str
 ) -> None:
     piece = class_of_piece("", name, "", place)
     assert (piece.nyu40, piece.rule) == (None if label is None else NYU40_NAMES.index(label), rule)
 
 
-def test_a_catalogue_piece_of_impossible_size_goes_by_its_name() -> None:
+def test_a_catalogue_piece_of_impossible_size_is_classified_by_name() -> None:
     tray = PieceSize(0.4, 0.03, 0.4)
     assert class_of_piece("eTeks#squareTable", "Tray", "", tray).rule == "name"
     assert class_of_piece("eTeks#squareTable", "Table", "", tray).rule == "size"
@@ -122,9 +120,9 @@ def test_a_catalogue_piece_of_impossible_size_goes_by_its_name() -> None:
 def test_a_television_unit_without_its_television_is_a_cabinet() -> None:
     whole, bench = PieceSize(1.0, 0.93, 0.52), PieceSize(1.0, 0.417, 0.52)
     for place, label in ((whole, "television"), (None, "television"), (bench, "cabinet")):
-        found = class_of_piece("eTeks#tvUnit", "TV unit", "", place).nyu40
-        assert found == NYU40_NAMES.index(label)
-    # A flat one is wide, too, but not deep.
+        nyu40 = class_of_piece("eTeks#tvUnit", "TV unit", "", place).nyu40
+        assert nyu40 == NYU40_NAMES.index(label)
+    # A flat screen is wide as well, but shallow.
     flat = class_of_piece("eTeks#flatTV", "Flat TV", "", PieceSize(1.6, 0.7, 0.2)).nyu40
     assert flat == NYU40_NAMES.index("television")
 
@@ -137,7 +135,7 @@ def test_accents_and_case_part_no_words() -> None:
     assert plain("KüchenSchrank TVUnit") == "kuchen schrank tv unit"
 
 
-def test_grass_that_lies_wide_and_flat_is_no_plant() -> None:
+def test_wide_flat_grass_is_no_plant() -> None:
     lawn = class_of_piece("", "Grass", place=PieceSize(8.0, 0.02, 6.0))
     assert (lawn.nyu40, lawn.word) == (None, "")
     assert class_of_piece("", "Grass", place=PieceSize(0.4, 0.3, 0.4)).word == "plant"

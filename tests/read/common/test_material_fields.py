@@ -1,4 +1,4 @@
-"""The table of what formats say of surfaces stands in the docs as the code has it."""
+"""The docs contain the table of material fields by format, as the code has it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Materials of models in OBJ: what their MTL says of colour and picture."""
+"""Materials of OBJ models: colour and picture from their MTL."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ def look(folder: Path, mtl: ObjMaterial) -> Material:
 
 
 @pytest.mark.parametrize("kd", [(0.0, 0.0, 0.0), GREY])
-def test_a_picture_beside_a_black_colour_or_none_is_shown_as_it_is(
+def test_a_picture_with_a_black_or_missing_colour_is_unchanged(
     tmp_path: Path, kd: tuple[float, float, float]
 ) -> None:
     mtl = ObjMaterial("wood", kd=kd, map_kd="p.png")
-    assert look(tmp_path, mtl).diffuse == GREY  # it is not there
+    assert look(tmp_path, mtl).diffuse == GREY  # the file is missing
     (tmp_path / "p.png").write_bytes(png())
-    found = look(tmp_path, mtl)
-    assert (found.diffuse, found.texture_id is not None) == (WHITE, True)
+    material = look(tmp_path, mtl)
+    assert (material.diffuse, material.texture_id is not None) == (WHITE, True)

@@ -1,4 +1,4 @@
-"""Names of nodes as modelling programs and shops of models write them, and what they are."""
+"""Classes of nodes by name, for the naming habits of modelling programs and model shops."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.read.common.furniture_classes import PieceSize
 from pbrs_farm.read.common.name_classes import class_of_node_name
 
-# A name and the class that a person gives it, or its kind; between them, what materials it shows.
+# Node name, the materials it shows (optional), and the class or kind a person gives it.
 NAMES_WITH_MATERIALS = """
 AI37_008_lamp_002_11_Lamp_floor_0 | Lamp_floor | lamp
 Bed_Bed_0 | material | bed
@@ -278,18 +278,18 @@ NAMES = [
 KINDS = ("plant", "stairs", "person", "ground")
 
 
-def said(name: str, *materials: str, size: PieceSize | None = None) -> str:
-    seen = class_of_node_name(name, materials=materials, size=size)
-    if seen is None:
+def class_of_name(name: str, *materials: str, size: PieceSize | None = None) -> str:
+    result = class_of_node_name(name, materials=materials, size=size)
+    if result is None:
         return "none"
-    return seen.kind.value if seen.kind.value in KINDS else NYU40_NAMES[seen.nyu40]
+    return result.kind.value if result.kind.value in KINDS else NYU40_NAMES[result.nyu40]
 
 
 def test_a_name_is_read_with_its_materials_parts_places_and_suffixes() -> None:
     wrong = [
-        f"{name}: {said(name, *materials)}, not {expected}"
+        f"{name}: {class_of_name(name, *materials)}, not {expected}"
         for name, *materials, expected in NAMES
-        if said(name, *materials) != expected
+        if class_of_name(name, *materials) != expected
     ]
     assert len(NAMES) > 200
     assert wrong == []
@@ -298,7 +298,7 @@ def test_a_name_is_read_with_its_materials_parts_places_and_suffixes() -> None:
 @pytest.mark.parametrize(
     ("name", "size", "expected"),
     [
-        ("Pine", PieceSize(4.0, 2.4, 5.0), "none"),  # all that is drawn in that wood
+        ("Pine", PieceSize(4.0, 2.4, 5.0), "none"),  # too large: all surfaces of that wood
         ("Pine", PieceSize(0.02, 2.0, 0.9), "none"),  # a board
         ("Pine", PieceSize(2.0, 5.0, 2.2), "plant"),
         ("Pine tree", PieceSize(4.0, 2.4, 5.0), "plant"),
@@ -310,7 +310,7 @@ def test_a_name_is_read_with_its_materials_parts_places_and_suffixes() -> None:
         ("Boy", PieceSize(0.5, 1.4, 0.3), "person"),
         ("Ceiling_connector", PieceSize(0.1, 0.04, 0.1), "none"),
         ("Ceiling", PieceSize(4.0, 0.04, 3.0), "ceiling"),
-        # Between the words of a name the size decides; it takes no class away.
+        # Size chooses between the words of a name; it never removes a class.
         ("bottle_dining_table", PieceSize(0.08, 0.3, 0.08), "otherprop"),
         ("bottle_dining_table", PieceSize(1.6, 0.8, 0.9), "table"),
         ("Sofa", PieceSize(0.3, 0.1, 0.1), "sofa"),
@@ -319,4 +319,4 @@ def test_a_name_is_read_with_its_materials_parts_places_and_suffixes() -> None:
 def test_its_size_decides_between_the_words_of_a_name(
     name: str, size: PieceSize, expected: str
 ) -> None:
-    assert said(name, size=size) == expected
+    assert class_of_name(name, size=size) == expected

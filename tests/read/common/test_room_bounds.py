@@ -1,4 +1,4 @@
-"""Hundreds of rooms drawn over each other are refused by a line, whatever the format."""
+"""Hundreds of overlapping rooms are refused with one line, in every format."""
 
 import json
 from pathlib import Path

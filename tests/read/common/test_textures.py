@@ -61,35 +61,35 @@ def saved(image: Image.Image) -> bytes:
     return buffer.getvalue()
 
 
-def test_alpha_is_a_hole_only_where_it_is_below_the_cutoff() -> None:
+def test_alpha_is_a_hole_only_below_the_cutoff() -> None:
     for alpha, holes in ((255, False), (130, False), (100, True)):
         assert texture_from_bytes(rgba([[255, alpha]]), "a").has_holes() is holes
-    found = texture_from_bytes(rgba([[200, 100], [200, 100]]), "a")
-    assert (found.has_holes(0.2), found.has_holes(0.9)) == (False, True)
-    assert np.allclose(found.alpha, [100 / 255, 200 / 255, 150 / 255])
+    texture = texture_from_bytes(rgba([[200, 100], [200, 100]]), "a")
+    assert (texture.has_holes(0.2), texture.has_holes(0.9)) == (False, True)
+    assert np.allclose(texture.alpha, [100 / 255, 200 / 255, 150 / 255])
 
 
 @pytest.mark.parametrize(
     ("channel", "expected"), [("r", 10), ("g", 20), ("b", 30), ("a", 40), ("", 40)]
 )
 def test_opacity_is_the_named_channel_of_another_picture(channel: str, expected: int) -> None:
-    other = saved(Image.new("RGBA", (2, 2), (10, 20, 30, 40)))
+    mask = saved(Image.new("RGBA", (2, 2), (10, 20, 30, 40)))
     colour = saved(Image.new("RGB", (4, 2), (7, 8, 9)))
-    made = Image.open(io.BytesIO(picture_with_alpha(colour, other, channel)))
-    assert made.size == (4, 2)
-    assert made.getpixel((0, 0)) == (7, 8, 9, expected)
-    assert Image.open(io.BytesIO(picture_with_alpha(None, other, channel))).getpixel((0, 0)) == (
+    merged = Image.open(io.BytesIO(picture_with_alpha(colour, mask, channel)))
+    assert merged.size == (4, 2)
+    assert merged.getpixel((0, 0)) == (7, 8, 9, expected)
+    assert Image.open(io.BytesIO(picture_with_alpha(None, mask, channel))).getpixel((0, 0)) == (
         255, 255, 255, expected,
     )  # fmt: skip
 
 
 def test_opacity_without_alpha_is_luminance_scaled_and_moved() -> None:
-    other = saved(grey([[0, 100, 200]]))
-    made = Image.open(io.BytesIO(picture_with_alpha(None, other, "", -1.0, 1.0)))
-    assert list(np.asarray(made)[0, :, 3]) == [255, 155, 55]
+    luminance = saved(grey([[0, 100, 200]]))
+    merged = Image.open(io.BytesIO(picture_with_alpha(None, luminance, "", -1.0, 1.0)))
+    assert list(np.asarray(merged)[0, :, 3]) == [255, 155, 55]
     deep = saved(Image.fromarray(np.array([[0, 65535]], np.uint16)))
-    made = Image.open(io.BytesIO(picture_with_alpha(None, deep)))
-    assert list(np.asarray(made)[0, :, 3]) == [0, 255]
+    merged = Image.open(io.BytesIO(picture_with_alpha(None, deep)))
+    assert list(np.asarray(merged)[0, :, 3]) == [0, 255]
 
 
 def test_a_picture_of_absurd_size_is_refused_before_it_is_decoded() -> None:
@@ -117,9 +117,9 @@ def test_whatever_the_bytes_the_outcome_is_a_texture_or_a_value_error(
     kind: str, changes: list[tuple[int, bytes, int]]
 ) -> None:
     data = encoded(kind)
-    for at, new, n_gone in changes:
-        at %= len(data) + 1
-        data = data[:at] + new + data[at + n_gone :]
+    for start, new, n_gone in changes:
+        start %= len(data) + 1
+        data = data[:start] + new + data[start + n_gone :]
     try:
         texture, _ = texture_from_bytes(data, "a")
     except ValueError:

@@ -1,4 +1,4 @@
-"""3D-FRONT houses of three generations, whole and damaged."""
+"""3D-FRONT houses of three generations, intact and damaged."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def test_a_repaired_house_of_each_generation_leaks_no_ray_and_keeps_walls_and_op
     assert (len(doors), len(windows), len(house.openings)) == (6, 5, 12)
     assert sum(i.kind is ItemKind.WALL for i in house.items) == 24
     if generation == "0.4":
-        return  # the others tell the same walls; one repair of jambs and one of gaps suffice
+        return  # the others have the same walls; testing one jamb and one gap is enough
     if generation == "0.10":
         return
     recipe = Recipe().model_copy(update={"read": ReadFields(stand_ins="none")})
@@ -63,15 +63,15 @@ def test_a_repaired_house_of_each_generation_leaks_no_ray_and_keeps_walls_and_op
 def test_walls_of_tiles_and_grout_have_the_openings_of_plain_ones(
     tmp_path: Path, generation: files.Generation
 ) -> None:
-    # Tiled from one side and from both: each mesh alone is full of gaps.
+    # The wall is tiled from one side or from both; each mesh alone is full of gaps.
     tiled = files.tile_walls(
         files.front_house(generation), ("Bathroom-5", "SecondBedroom-6", "Kitchen-2")
     )
     house = read(written(tmp_path, tiled))
     plain = read(written(tmp_path, files.front_house(generation)))
     assert [o.id for o in house.openings] == [o.id for o in plain.openings]
-    for one, other in zip(house.openings, plain.openings, strict=True):
-        np.testing.assert_allclose(one.quad, other.quad, atol=0.01)
+    for opening, expected in zip(house.openings, plain.openings, strict=True):
+        np.testing.assert_allclose(opening.quad, expected.quad, atol=0.01)
     walls = [i for i in house.items if i.kind is ItemKind.WALL]
     assert len(walls) == 24
     # The larger mesh paints the wall.
@@ -79,31 +79,29 @@ def test_walls_of_tiles_and_grout_have_the_openings_of_plain_ones(
     assert painted == {"paint", "tiles"}
 
 
-def test_a_wall_of_two_meshes_beside_each_other_has_no_hole_where_one_fills_the_other(
-    tmp_path: Path,
-) -> None:
-    # Paint in the form of an L round a panel in its upper corner, from either side of one wall.
-    given = files.front_house("0.11 gaps")
+def test_a_wall_of_two_adjacent_meshes_has_no_false_hole(tmp_path: Path) -> None:
+    # L-shaped paint around a panel in its upper corner, on both sides of one wall.
+    front_house = files.front_house("0.11 gaps")
     for z, name in ((4.0, "LivingRoom-1"), (4.12, "Hallway-3")):
-        room = next(r for r in given["scene"]["room"] if r["instanceid"] == name)
+        room = next(r for r in front_house["scene"]["room"] if r["instanceid"] == name)
         refs = {c["ref"] for c in room["children"]}
         mesh = next(
             m
-            for m in given["mesh"]
+            for m in front_house["mesh"]
             if m["uid"] in refs and m["type"] == "WallInner" and set(m["xyz"][2::3]) == {z}
         )
         corners = np.reshape(mesh["xyz"], (-1, 3, 3))
         is_panel = (corners[..., 0].max(1) < 1.6) & (corners[..., 1].min(1) > 2)
         assert is_panel.any()
-        for part, own in (("paint", ~is_panel), ("panel", is_panel)):
-            xyz = corners[own].reshape(-1, 3)
+        for part, part_faces in (("paint", ~is_panel), ("panel", is_panel)):
+            xyz = corners[part_faces].reshape(-1, 3)
             row = {"uid": f"{name}/{part}", "xyz": xyz.ravel().tolist()}
-            given["mesh"].append({**mesh, **row, "faces": list(range(len(xyz)))})
+            front_house["mesh"].append({**mesh, **row, "faces": list(range(len(xyz)))})
             child = next(c for c in room["children"] if c["ref"] == mesh["uid"])
             room["children"].append({**child, "ref": f"{name}/{part}"})
-        given["mesh"].remove(mesh)
+        front_house["mesh"].remove(mesh)
     plain = read(written(tmp_path, files.front_house("0.11 gaps")))
-    assert len(read(written(tmp_path, given)).openings) == len(plain.openings)
+    assert len(read(written(tmp_path, front_house)).openings) == len(plain.openings)
 
 
 def test_rooms_have_the_types_and_areas_of_the_file(tmp_path: Path) -> None:
@@ -118,7 +116,7 @@ def test_walls_are_as_thick_as_the_distance_of_their_faces(tmp_path: Path) -> No
     house = read(written(tmp_path, files.front_house("0.11 gaps")))
     walls = [i for i in house.items if i.kind is ItemKind.WALL]
     outside = min(walls, key=lambda i: float(i.bounds[0, 2]))
-    # Mitred: the back runs to the outer corner.
+    # Mitred: the back extends to the outer corner.
     assert outside.bounds[0, 2] == pytest.approx(-0.24, abs=1e-4)
     for opening, (_, _, (x, z), axis, width, low, high, depth, _d) in zip(
         sorted(house.openings, key=lambda o: tuple(np.round(o.quad.mean(0), 2))),
@@ -132,7 +130,7 @@ def test_walls_are_as_thick_as_the_distance_of_their_faces(tmp_path: Path) -> No
         assert across == pytest.approx(depth + 0.04, abs=0.01)
 
 
-def test_ceilings_and_floors_look_into_the_room_however_they_are_wound(tmp_path: Path) -> None:
+def test_ceilings_and_floors_of_either_winding_face_the_room(tmp_path: Path) -> None:
     for generation in ("0.4", "0.11"):
         house = read(written(tmp_path, files.front_house(generation)))
         for item in house.items:
@@ -143,9 +141,7 @@ def test_ceilings_and_floors_look_into_the_room_however_they_are_wound(tmp_path:
                     assert ((n > 0) == (item.kind is ItemKind.FLOOR)).all()
 
 
-def test_titles_make_sliding_doors_of_glass_and_mirrored_doors_hang_on_the_other_side(
-    tmp_path: Path,
-) -> None:
+def test_titles_give_sliding_doors_of_glass_and_mirrored_doors_change_sides(tmp_path: Path) -> None:
     house = read(written(tmp_path, files.front_house()))
     doors = {i.source_class: i for i in house.items if i.kind is ItemKind.DOOR}
     sliding = doors["door/double sliding door"]
@@ -153,7 +149,7 @@ def test_titles_make_sliding_doors_of_glass_and_mirrored_doors_hang_on_the_other
     assert MaterialKind.PANE in kinds
     plain = doors["door/single swing door"]
     assert MaterialKind.PANE not in [house.materials[s.material].kind for s in plain.surfaces]
-    # Mirror a door's piece: its handle goes to the other side.
+    # Mirror a door model: its handle changes sides.
     scene = files.front_house()
     handles = []
     for mirrored in (False, True):
@@ -177,27 +173,25 @@ def _door_at(house: House, x: float, z: float) -> Any:
     )  # fmt: skip
 
 
-def test_pieces_stand_where_their_child_places_them_with_the_classes_of_the_tables(
-    tmp_path: Path,
-) -> None:
+def test_pieces_have_the_place_of_their_child_and_the_class_of_the_tables(tmp_path: Path) -> None:
     house = read(files.write_house(tmp_path))
     pieces = [i for i in house.items if i.id.startswith("piece_")]
     assert len(pieces) == files.N_DRAWN
     sofa = next(i for i in pieces if "Sofa" in i.source_class)
     np.testing.assert_allclose(sofa.bounds, [[0.15, 0, 2.95], [2.25, 0.8, 3.85]], atol=1e-4)
-    # Turned by 180 degrees: the lower half, its front, looks to -z.
+    # Turned by 180 degrees: the lower half, which is the front, faces -z.
     high = np.concatenate([s.positions for s in sofa.surfaces])
     assert high[high[:, 1] > 0.7][:, 2].min() == pytest.approx(3.4, abs=1e-4)
     assert all(len(s.faces) != 2 for i in pieces for s in i.surfaces), "the shadow cards are gone"
     assert sum("mirrored" in i.tags for i in pieces) == 1
     for _, title, category, *_rest in files.PIECES[:-1]:
         item = next(i for i in pieces if i.source_class == (category or title))
-        seen = given_class("3dfuture", category) or given_class("3dfront-title", title)
-        assert seen is not None
-        assert NYU40_NAMES[item.nyu40] == NYU40_NAMES[seen.nyu40]
+        classes = given_class("3dfuture", category) or given_class("3dfront-title", title)
+        assert classes is not None
+        assert NYU40_NAMES[item.nyu40] == NYU40_NAMES[classes.nyu40]
 
 
-def test_without_models_every_piece_is_told_by_its_size_and_one_note_says_so(
+def test_without_models_pieces_are_boxes_of_their_size_and_one_note_reports_it(
     tmp_path: Path,
 ) -> None:
     house = read(files.write_house(tmp_path, with_models=False))
@@ -221,7 +215,7 @@ def test_models_may_lie_in_a_folder_that_is_named(tmp_path: Path) -> None:
         assert not any(BOX_ONLY in i.tags for i in read_house(source, ReadFields()).items)
 
 
-def test_a_told_light_is_a_lamp_where_no_lamp_stands_in_the_colour_it_has(tmp_path: Path) -> None:
+def test_a_declared_light_without_a_lamp_becomes_a_lamp_of_its_colour(tmp_path: Path) -> None:
     house = read(files.write_house(tmp_path))
     spots = [i for i in house.items if i.id.startswith("light_")]
     assert len(spots) == 3
@@ -243,15 +237,15 @@ def test_missing_invalid_and_flat_pieces_are_notes_with_their_number(tmp_path: P
     ]  # fmt: skip
 
 
-# What is refused: one line with the place.
+# Refused inputs: one line with the place.
 
 
 def _changed(path: list[Any], value: Any) -> dict[str, Any]:
     scene = files.front_house()
-    at: Any = scene
+    target: Any = scene
     for step in path[:-1]:
-        at = at[step]
-    at[path[-1]] = value
+        target = target[step]
+    target[path[-1]] = value
     return scene
 
 
@@ -269,9 +263,7 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_a_damaged_house_is_refused_in_one_line_that_names_the_place(
-    tmp_path: Path, name: str
-) -> None:
+def test_a_damaged_house_is_refused_with_its_place(tmp_path: Path, name: str) -> None:
     scene, expected = FAULTS[name]
     if name == "a short turn":
         for child in scene["scene"]["room"][0]["children"]:
@@ -308,7 +300,7 @@ def test_ids_twice_and_names_that_lead_out_do_no_harm(tmp_path: Path) -> None:
     assert len(ids) == len(set(ids))
 
 
-def test_uids_are_told_apart_by_their_last_characters(tmp_path: Path) -> None:
+def test_uids_are_distinguished_by_their_last_characters(tmp_path: Path) -> None:
     short = read(written(tmp_path / "short", files.front_house()))
     scene = files.front_house()
     renamed = {mesh["uid"]: "x" * 80 + f"/{k:03d}" for k, mesh in enumerate(scene["mesh"])}
@@ -332,7 +324,7 @@ def test_a_second_mesh_of_one_uid_is_read_if_it_differs(tmp_path: Path) -> None:
     assert notes.count("duplicate-id") == 2
 
 
-def test_a_million_entries_are_refused_at_once(tmp_path: Path) -> None:
+def test_a_million_entries_are_refused_quickly(tmp_path: Path) -> None:
     path = tmp_path / "many.json"
     path.write_text('{"furniture":[],"mesh":[' + '{"type":"Floor"},' * 10**6 + '{}],"scene":{"room":[{}]}}')  # fmt: skip
     start = time.monotonic()

@@ -1,4 +1,4 @@
-"""glTF scenes built in code, as a modeller's program might write them; no effects."""
+"""glTF scenes built in code, like those of modelling programs; no effects."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ class Scene:
 
 
 def two_rooms() -> Scene:
-    """Two rooms, 4 x 3 and 2 x 3 m, on one floor, parted by a planar wall with a door in it."""
+    """Two rooms, 4 x 3 and 2 x 3 m, on one floor, separated by a planar wall with a door."""
     s = Scene()
     s.node("Floor", mesh=s.mesh([[[0, 0, 3], [6, 0, 3], [6, 0, 0], [0, 0, 0]]]))
     s.node("Ceiling", mesh=s.mesh([[[0, 2.6, 0], [6, 2.6, 0], [6, 2.6, 3], [0, 2.6, 3]]]))
@@ -103,7 +103,7 @@ def two_rooms() -> Scene:
 
 
 def read(scene: Scene, **beside: Any) -> House:
-    """The House of a scene, with what lies beside it."""
+    """The House of a scene and its sidecar files."""
     return read_gltf(scene.glb(), "scene.glb", fields=ReadFields(), beside=Beside(**beside))
 
 

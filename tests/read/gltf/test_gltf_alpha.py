@@ -49,7 +49,7 @@ def leaf(data: bytes | None, mode: str, **more: Any) -> tuple[Material, House]:
         ({CUTOFF: 0.3, FACTOR: 0.5}, 0.6), ({CUTOFF: 0.1, FACTOR: 0.5}, None),
     ],
 )  # fmt: skip
-def test_mask_cuts_what_is_below_its_cutoff_and_the_rest_is_opaque(
+def test_mask_cuts_below_its_cutoff_and_is_opaque_above(
     more: dict[str, Any], cutoff: float | None
 ) -> None:
     material, house = leaf(picture(200, 90), "MASK", **more)
@@ -79,8 +79,8 @@ def test_a_surface_that_is_cut_out_as_a_whole_is_a_note(
         ((200, 90), 1.0, True, MaterialKind.OPAQUE, 1.0),
         ((255, 200), 1.0, False, MaterialKind.OPAQUE, 1.0),  # a soft edge
         ((255, 0), 0.4, True, MaterialKind.GLASS, 0.4),  # clear with holes
-        ((51, 51), 1.0, False, MaterialKind.GLASS, 0.2),  # as clear all over
-        ((102, 0), 0.5, False, MaterialKind.GLASS, 0.1),  # nowhere half solid: the mean
+        ((51, 51), 1.0, False, MaterialKind.GLASS, 0.2),  # uniformly transparent
+        ((102, 0), 0.5, False, MaterialKind.GLASS, 0.1),  # no texel is half opaque: the mean counts
     ],
 )
 def test_blend_cuts_at_one_half_or_is_glass(

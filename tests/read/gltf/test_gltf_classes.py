@@ -22,7 +22,7 @@ def test_ground_that_is_called_grass_is_ground_and_a_tuft_of_it_a_plant() -> Non
     assert [kinds[n][0] for n in ("Grass.001", "Hedge", "Turf")] == ["plant"] * 3
 
 
-def test_names_tell_classes_and_unknown_ones_are_otherprop_and_said_so() -> None:
+def test_names_give_classes_and_unknown_ones_are_otherprop_with_a_note() -> None:
     s = two_rooms()
     cube = s.box([0, 0, 0], [0.5, 0.5, 0.5])
     for name in ("Armchair_01", "wall lamp", "Thing.002", "Kitchen cabinet L"):
@@ -57,7 +57,7 @@ def test_the_mapping_file_beats_names_and_extras_beat_the_mapping() -> None:
     assert not house.notes
 
 
-def test_a_group_is_one_item_unless_its_name_means_several() -> None:
+def test_a_group_is_one_item_unless_its_name_is_plural() -> None:
     s = two_rooms()
     cube = s.box([0, 0, 0], [0.2, 0.2, 0.2])
     legs = [s.node(f"leg {k}", mesh=cube, translation=[k, 0, 0]) for k in range(3)]
@@ -72,7 +72,7 @@ def test_a_group_is_one_item_unless_its_name_means_several() -> None:
     names = [i.name for i in house.items][7:]
     assert names == ["Table", "Cube.000", "Cube.001", "Desk", "Vase"]
     assert item(house, "Cube.001").nyu40 == 5
-    assert item(house, "Desk").n_faces == 24  # its lamp, untagged, is a part of it
+    assert item(house, "Desk").n_faces == 24  # its untagged lamp is part of it
     assert not house.notes
 
 
@@ -93,7 +93,7 @@ def test_a_wrong_mapping_row_is_refused_naming_it() -> None:
         read(two_rooms(), mapping=b'{"nodes": {"A": "spaceship"}}')
 
 
-def test_materials_sizes_and_collections_tell_what_a_name_means() -> None:
+def test_materials_sizes_and_collections_disambiguate_names() -> None:
     s = two_rooms()
     s.materials += [{"name": "mirror_toilet"}, {"name": "Table_Kitchen"}]
     pane = s.box([1, 1, 0.1], [1.6, 1.8, 0.12], len(s.materials) - 2)
@@ -114,7 +114,7 @@ def test_materials_sizes_and_collections_tell_what_a_name_means() -> None:
     assert kinds["Bottle_dining_table"] == ("object", "otherprop")
 
 
-def test_the_mirror_and_the_pane_of_a_piece_are_known_by_their_nodes_names() -> None:
+def test_node_names_mark_the_mirror_and_the_pane_of_a_piece() -> None:
     s = two_rooms()
     s.materials += [{"name": "Chrome"}]
     sheet = s.box([1, 1, 0.1], [1.6, 1.8, 0.11], len(s.materials) - 1)
@@ -125,7 +125,7 @@ def test_the_mirror_and_the_pane_of_a_piece_are_known_by_their_nodes_names() -> 
     ]  # fmt: skip
 
 
-def test_a_material_names_a_thing_only_of_a_size_that_fits() -> None:
+def test_a_material_names_an_item_only_if_its_size_fits() -> None:
     s = two_rooms()
     boxes = {
         "Plane.001": ("Grass", [-6, -0.3, -6], [10, -0.13, -0.13]),

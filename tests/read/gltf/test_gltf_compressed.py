@@ -21,7 +21,7 @@ KTX2 = b"\xabKTX 20\xbb\r\n\x1a\n"
 
 
 def with_draco_sofa(data: bytes | None = None) -> Scene:
-    """Two rooms and a sofa 1 m wide whose mesh is Draco's alone."""
+    """Two rooms and a sofa 1 m wide whose mesh exists only in Draco form."""
     import DracoPy
 
     scene = two_rooms()
@@ -33,10 +33,10 @@ def with_draco_sofa(data: bytes | None = None) -> Scene:
     n = len(DracoPy.decode(packed).points)
     view = scene.writer.add_bytes(packed if data is None else data)
     bare = {"componentType": 5126, "count": n, "type": "VEC3"}
-    scene.writer._accessors.append(bare)
+    scene.writer.accessors.append(bare)
     extension = {"bufferView": view, "attributes": {"POSITION": 0}}
     row = {
-        "attributes": {"POSITION": len(scene.writer._accessors) - 1},
+        "attributes": {"POSITION": len(scene.writer.accessors) - 1},
         "extensions": {"KHR_draco_mesh_compression": extension},
     }
     scene.meshes.append({"primitives": [row]})
@@ -60,18 +60,18 @@ def test_a_draco_mesh_is_the_mesh_that_was_packed() -> None:
 @pytest.mark.parametrize(
     "data", [b"", b"DRACO", b"DRACO\x02\x02\x01\x01" + b"\xff" * 40, b"x" * 99]
 )
-def test_damaged_draco_data_is_one_line_with_its_place(data: bytes) -> None:
+def test_damaged_draco_data_is_refused_with_its_place(data: bytes) -> None:
     with pytest.raises(BadHouse, match=r"meshes\[\d+\]\.primitives\[0\]"):
         read(with_draco_sofa(data))
 
 
 def test_without_its_decoder_a_draco_file_is_refused_by_name(monkeypatch: Any) -> None:
-    scene, own = with_draco_sofa(), builtins.__import__
+    scene, import_before = with_draco_sofa(), builtins.__import__
 
     def without(name: str, *rest: Any, **more: Any) -> Any:
         if name in ("DracoPy", "opengl_basisu"):
             raise ImportError(name)
-        return own(name, *rest, **more)
+        return import_before(name, *rest, **more)
 
     monkeypatch.setattr(builtins, "__import__", without)
     with pytest.raises(BadHouse, match=r"KHR_draco_mesh_compression needs DracoPy.*gltf-transform"):
@@ -83,18 +83,20 @@ def test_without_its_decoder_a_draco_file_is_refused_by_name(monkeypatch: Any) -
 @pytest.mark.parametrize(
     ("size", "said"), [((4, 4), "cannot be decoded"), ((60_000, 60_000), "too large")]
 )
-def test_a_damaged_or_huge_ktx2_picture_says_why(size: tuple[int, int], said: str) -> None:
+def test_a_damaged_or_huge_ktx2_picture_is_refused_with_a_reason(
+    size: tuple[int, int], said: str
+) -> None:
     header = KTX2 + struct.pack("<IIIIIIIII", 0, 1, *size, 0, 0, 1, 1, 1) + bytes(40)
     with pytest.raises(ValueError, match=said):
         decoded_picture(header)
 
 
-def test_a_sparse_accessor_replaces_what_it_names() -> None:
+def test_a_sparse_accessor_replaces_the_listed_values() -> None:
     scene = with_sofa(two_rooms())
     position = scene.meshes[-1]["primitives"][0]["attributes"]["POSITION"]
     places = scene.writer.add_bytes(np.array([0], np.uint8).tobytes())
     values = scene.writer.add_bytes(np.array([[2, 0, 1.5]], np.float32).tobytes())
-    accessor = scene.writer._accessors[position]
+    accessor = scene.writer.accessors[position]
     accessor["sparse"] = {
         "count": 1,
         "indices": {"bufferView": places, "componentType": 5121},
@@ -107,7 +109,7 @@ def test_a_sparse_accessor_replaces_what_it_names() -> None:
         read(scene)
 
 
-# An 8 x 8 picture of four plain quarters, made for this test, in both of Basis' codecs.
+# An 8 x 8 picture of four uniform quarters, made for this test, in both Basis codecs.
 UASTC = (
     "q0tUWCAyMLsNChoKAAAAAAEAAAAIAAAACAAAAAAAAAAAAAAAAQAAAAEAAAAAAAAAaAAAACwAAACUAAAALAAAAAAA"
     "AAAAAAAAAAAAAAAAAADAAAAAAAAAAEAAAAAAAAAAQAAAAAAAAAAsAAAAAAAAAAIAKACmAQIAAwMAABAAAAAAAAAA"

@@ -57,7 +57,7 @@ def test_a_damaged_scene_is_refused_naming_the_place(edit: Any, place: str) -> N
         (b' {"nodes": []}', "text.glb", "this is not a glTF file"),
     ],
 )
-def test_what_is_no_scene_is_called_so(data: bytes, name: str, said: str) -> None:
+def test_a_file_that_is_no_scene_is_refused(data: bytes, name: str, said: str) -> None:
     with pytest.raises(BadHouse, match=said):
         read_gltf(data, name, fields=ReadFields())
 
@@ -100,7 +100,7 @@ def test_names_that_lead_out_of_the_folder_are_refused(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("is_flat", [True, False])
-def test_too_many_nodes_are_refused_before_one_of_them_is_read(
+def test_too_many_nodes_are_refused_before_any_is_read(
     is_flat: bool, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     read_nodes: list[int] = []

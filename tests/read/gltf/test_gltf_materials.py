@@ -65,7 +65,7 @@ def test_materials_keep_colour_gloss_glass_and_mirror() -> None:
     assert (look["clear"].kind, look["clear"].opacity) == (MaterialKind.GLASS, 0.0)
 
 
-def test_gloss_survives_the_way_through_our_own_glb() -> None:
+def test_gloss_survives_a_round_trip_through_our_glb() -> None:
     home = builtin_home()
     shiny = replace(home.materials[0], shininess=40.0)
     home = replace(home, materials=(shiny, *home.materials[1:]))
@@ -96,7 +96,7 @@ def test_roughness_and_normal_maps_come_with_their_factors() -> None:
     assert house.textures[wood.roughness_texture_id or ""].data == pictures[0]
     assert house.textures[wood.normal_texture_id or ""].data == pictures[1]
     assert (wood.roughness, wood.normal_scale, wood.texture_id) == (0.5, 0.5, None)
-    # glTF's defaults are metal of roughness 1: no longer black.
+    # glTF's default is metal of roughness 1, which used to come out black.
     assert look["iron"].roughness == 1.0
     assert look["iron"].specular == pytest.approx((0.735,) * 3, abs=1e-3)
     # A surface has one set of texture coordinates.
@@ -104,7 +104,7 @@ def test_roughness_and_normal_maps_come_with_their_factors() -> None:
     assert any(n.kind == "texture-layout" and "normalTexture" in n.text for n in house.notes)
 
 
-def test_maps_survive_the_way_through_our_own_glb() -> None:
+def test_maps_survive_a_round_trip_through_our_glb() -> None:
     home = builtin_home()
     number = next(k for k, m in enumerate(home.materials) if m.texture_id)
     picture = home.materials[number].texture_id
@@ -121,7 +121,7 @@ def test_maps_survive_the_way_through_our_own_glb() -> None:
     assert all(m.roughness is None for m in house.materials if m.name == "carpet")
 
 
-def test_punctual_lights_become_lumens_of_the_lamp_they_hang_in() -> None:
+def test_punctual_lights_become_lumens_of_their_lamp() -> None:
     s = two_rooms()
     s.more["extensions"] = {
         "KHR_lights_punctual": {
@@ -165,7 +165,7 @@ def test_emissive_surfaces_of_objects_emit_and_floors_never_glow() -> None:
     house = read(s)
     (screen,) = item(house, "TV").lights
     assert screen.emitting == (0,)
-    # Both sides of an open surface shine as told.
+    # Both sides of an open surface emit the declared radiance.
     assert screen.power == pytest.approx(2 * np.pi * 1000 * 0.5)
     (lamp,) = item(house, "Floor lamp").lights
     assert (lamp.power, lamp.emitting) == (800.0, (0,))
@@ -180,35 +180,35 @@ def strong(name: str, rgb: list[float], strength: float) -> dict[str, object]:
     return {"name": name, "emissiveFactor": rgb, "extensions": extension, "doubleSided": True}
 
 
-def test_emitters_shine_as_bright_and_in_the_colour_that_they_are_told() -> None:
+def test_emitters_have_their_declared_brightness_and_colour() -> None:
     s = two_rooms()
-    told = {
+    candelas = {
         "Panel": ([1, 1, 1], 1000), "Red panel": ([1, 0, 0], 500), "Green box": ([0.2, 0.8, 0.1], 300),
         "Lamp": ([1, 1, 1], 2000),
     }  # fmt: skip
     first = len(s.materials)
-    s.materials += [strong(name, rgb, strength) for name, (rgb, strength) in told.items()]
+    s.materials += [strong(name, rgb, strength) for name, (rgb, strength) in candelas.items()]
     for k, name in enumerate(("Panel", "Red panel")):
         z = 1.0 + k
         s.node(name, mesh=s.mesh([[[0.5, 1, z], [1, 1, z], [1, 1.5, z], [0.5, 1.5, z]]], first + k))
     s.node("Green box", mesh=s.box([2, 1, 1], [2.2, 1.2, 1.2], first + 2))
-    # A bulb within a body that keeps most of its light is as bright.
+    # A bulb inside a body that absorbs most of its light is as bright.
     bulb = s.node("bulb", mesh=s.box([2, 2, 2], [2.1, 2.1, 2.1], first + 3))
     s.node("Lamp", mesh=s.box([1.9, 1.9, 1.9], [2.2, 2.2, 2.2]), children=[bulb])
     house, _report = repair(read(s), RepairFields(), occluder_from=caster_of)
     geometry = geometry_from_house(house)
     keep = np.ones(len(geometry.faces), bool)
     emitters = area_emitters_of_house(house, geometry, keep, recipe_from_name("fast"))
-    found = {house.items[e.item].name: np.array(e.radiance) * LM_PER_W for e in emitters}
-    for name, (rgb, strength) in told.items():
-        np.testing.assert_allclose(found[name], np.array(rgb) * strength, rtol=0.01, err_msg=name)
+    emitted = {house.items[e.item].name: np.array(e.radiance) * LM_PER_W for e in emitters}
+    for name, (rgb, strength) in candelas.items():
+        np.testing.assert_allclose(emitted[name], np.array(rgb) * strength, rtol=0.01, err_msg=name)
 
 
 def caster_of(house: House) -> Caster:
     return Caster(geometry_from_house(house))
 
 
-def test_a_lamp_without_a_colour_keeps_its_warm_white_and_a_white_one_is_white() -> None:
+def test_a_lamp_without_a_colour_is_warm_white_and_a_white_one_stays_white() -> None:
     s = two_rooms()
     point = {"type": "point", "intensity": 50}
     lights = [point, {**point, "color": [1, 1, 1]}]
@@ -225,13 +225,13 @@ def test_a_lamp_without_a_colour_keeps_its_warm_white_and_a_white_one_is_white()
     )
     assert plain[0] > 5 * plain[2]
     np.testing.assert_allclose(white, 1.0)
-    # The pair of stored files says the same.
+    # The stored pair of files has the same values.
     data = bundle_from_house(house)
     back = house_from_bundle(*data)
     assert item(back, "White lamp").lights == item(house, "White lamp").lights
 
 
-def test_a_lamp_without_any_light_gets_an_assumed_one() -> None:
+def test_a_lamp_without_a_light_gets_an_assumed_power() -> None:
     s = two_rooms()
     s.node("Lamp", mesh=s.box([1, 0, 1], [1.2, 1, 1.2]))
     lamp = item(read(s), "Lamp")
@@ -246,7 +246,7 @@ def test_a_lamp_without_any_light_gets_an_assumed_one() -> None:
         (("windowGlass.001", "wood"), {"windowGlass.001"}),
         (("Fensterscheibe Glas", "Fensterrahmen"), {"Fensterscheibe Glas"}),
         (("Window", "Wood"), {"Window"}),
-        (("window", "glass"), {"glass"}),  # beside a glass "window" names the frame
+        (("window", "glass"), {"glass"}),  # "window" names the frame if there is a glass beside it
         (("glass frame", "plastic"), set()),
     ],
 )
@@ -259,14 +259,14 @@ def test_an_opaque_material_named_glass_in_a_window_is_a_pane(
     s.node("Window", children=parts)
     s.node("Table", mesh=s.box([1, 0, 1], [2, 0.7, 2], 0))
     house = read(s)
-    seen = [house.materials[x.material] for x in item(house, "Window").surfaces]
-    assert {m.name for m in seen if m.kind is MaterialKind.PANE} == panes
-    assert all(m.opacity < 0.5 for m in seen if m.kind is MaterialKind.PANE)
+    materials = [house.materials[x.material] for x in item(house, "Window").surfaces]
+    assert {m.name for m in materials if m.kind is MaterialKind.PANE} == panes
+    assert all(m.opacity < 0.5 for m in materials if m.kind is MaterialKind.PANE)
     (table,) = (house.materials[x.material] for x in item(house, "Table").surfaces)
     assert table.kind is MaterialKind.OPAQUE
 
 
-def test_a_part_named_glass_of_a_window_is_a_pane_whatever_its_material() -> None:
+def test_a_part_named_glass_of_a_window_is_a_pane_of_any_material() -> None:
     s = two_rooms()
     pane = s.node("Glass", mesh=s.box([1, 1, 0], [2, 2, 0.02]))
     frame = s.node("Glass frame", mesh=s.box([1, 0.9, 0], [2, 1, 0.05]))

@@ -15,7 +15,7 @@ from pbrs_farm.read.gltf.scene import read_gltf_file
 from tests.read.gltf.gltf_scenes import area, item, read, two_rooms
 
 
-def test_our_own_glb_reads_back_as_the_same_items_and_rooms(tmp_path: Path) -> None:
+def test_our_glb_reads_back_as_the_same_items_and_rooms(tmp_path: Path) -> None:
     home = builtin_home()
     path = tmp_path / "home.glb"
     path.write_bytes(bundle_from_house(home)[0])
@@ -41,10 +41,10 @@ def test_interleaved_and_quantized_arrays_read_as_the_plain_ones() -> None:
     rows["p"] = np.rint(corners * 32767)
     rows["uv"] = corners[:, :2] * 255
     view = s.writer.add_bytes(rows.tobytes())
-    s.writer._views[view]["byteStride"] = rows.itemsize
+    s.writer.views[view]["byteStride"] = rows.itemsize
     indices = s.writer.add_bytes(np.array([0, 1, 2, 0, 2, 3], "<u2").tobytes())
-    first = len(s.writer._accessors)
-    s.writer._accessors += [
+    first = len(s.writer.accessors)
+    s.writer.accessors += [
         {"bufferView": view, "componentType": 5122, "count": 4, "type": "VEC3", "normalized": True},
         {"bufferView": view, "byteOffset": 8, "componentType": 5121, "count": 4, "type": "VEC2",
          "normalized": True},
@@ -77,11 +77,11 @@ def test_transforms_compose_down_the_tree() -> None:
     assert sorted(bed.box.half) == pytest.approx([0.5, 0.5, 1.0])
 
 
-def test_things_far_smaller_than_their_nodes_units_are_there_and_flat_ones_are_noted() -> None:
+def test_items_far_smaller_than_their_nodes_units_are_read_and_flat_ones_are_noted() -> None:
     scene = two_rooms()
     for name, size, scale in (
         ("Jug", 2_000.0, [1e-4] * 3),
-        ("Table", 16_384.0, [6.1e-5] * 3),  # as KHR_mesh_quantization places 16 bits
+        ("Table", 16_384.0, [6.1e-5] * 3),  # 16-bit positions, as KHR_mesh_quantization scales them
         ("Chair", 1e8, [1e-8] * 3),
         ("Poster", 1.0, [1.0, 1.0, 1e-9]),
         ("Sofa", 1.0, [1.0, 1.0, 0.0]),
@@ -129,7 +129,7 @@ def test_strips_and_fans_become_the_same_triangles_as_drawn(mode: int) -> None:
     p = surface.positions[surface.faces]
     n = np.cross(p[:, 1] - p[:, 0], p[:, 2] - p[:, 0])
     assert np.allclose(n, [[0, 0, 1]] * 2)
-    assert surface.normals is None  # flat, as glTF asks where there are none
+    assert surface.normals is None  # flat, the glTF default
 
 
 def test_a_gltf_with_files_beside_it_reads_the_same(tmp_path: Path) -> None:
@@ -143,14 +143,14 @@ def test_a_gltf_with_files_beside_it_reads_the_same(tmp_path: Path) -> None:
     (tmp_path / "room.classes.json").write_text('{"nodes": {"Wall.*": "otherstructure"}}')
     house = read_gltf_file(tmp_path / "room.gltf", ReadFields())
     assert item(house, "Wall.001").nyu40 == 38
-    assert len(house.rooms) == 1  # that wall is none now
+    assert len(house.rooms) == 1  # that wall is no longer recognised as one
     document["buffers"][0]["uri"] = (
         "data:application/octet-stream;base64," + base64.b64encode(binary.buffers[0]).decode()
     )
     (tmp_path / "other.gltf").write_text(json.dumps(document))
-    other = read_gltf_file(tmp_path / "other.gltf", ReadFields())
-    assert np.array_equal(other.items[0].bounds, house.items[0].bounds)
-    assert other.id != house.id
+    reread = read_gltf_file(tmp_path / "other.gltf", ReadFields())
+    assert np.array_equal(reread.items[0].bounds, house.items[0].bounds)
+    assert reread.id != house.id
 
 
 def test_the_scene_survives_the_bundle() -> None:

@@ -1,4 +1,4 @@
-"""What glTF's material extensions and samplers say of a surface: seen in its colour and on the picture."""
+"""Material extensions and samplers of glTF: colour of the surface, and its picture."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ GLOSS = "KHR_materials_pbrSpecularGlossiness"
 
 
 def scene_with(material: dict[str, Any], *pictures: bytes) -> Scene:
-    """Two rooms and a board called Chair of that material, its uv 0..1."""
+    """Two rooms and a board named Chair with that material, uv 0..1."""
     s = two_rooms()
     views = [s.writer.add_bytes(data) for data in pictures]
     s.more = {
@@ -59,18 +59,20 @@ def test_specular_glossiness_gives_colour_gloss_and_its_picture() -> None:
 def test_a_metal_of_specular_glossiness_has_its_specular_colour_and_its_gloss_as_roughness() -> (
     None
 ):
-    both = {"diffuseTexture": {"index": 0}, "specularGlossinessTexture": {"index": 1}}
+    textures = {"diffuseTexture": {"index": 0}, "specularGlossinessTexture": {"index": 1}}
     buffer = io.BytesIO()
     Image.new("RGBA", (2, 2), (255, 200, 80, 204)).save(buffer, "PNG")
-    house = read(scene_with({"extensions": {GLOSS: both}}, png(rgb=(0, 0, 0)), buffer.getvalue()))
+    house = read(
+        scene_with({"extensions": {GLOSS: textures}}, png(rgb=(0, 0, 0)), buffer.getvalue())
+    )
     look = board(house)[1]
     gold = np.array([255, 200, 80]) / 255
     assert picture(house, look.texture_id)[0, 0] == pytest.approx(gold, abs=0.03)
     assert picture(house, look.roughness_texture_id)[0, 0, 1] == pytest.approx(0.2, abs=0.01)
-    assert look.roughness == 1  # times the picture
+    assert look.roughness == 1  # multiplied by the picture
 
 
-def test_what_says_nothing_of_its_surface_is_no_metal() -> None:
+def test_a_surface_without_metallic_factors_is_no_metal() -> None:
     for material in ({"name": "paint"}, {PBR: {}}, {"extensions": {"KHR_materials_unlit": {}}}):
         look = board(read(scene_with(material)))[1]
         assert look.diffuse == pytest.approx((1.0,) * 3)
@@ -87,14 +89,17 @@ def test_a_picture_that_cannot_be_had_is_a_matte_grey_with_its_name_in_a_note() 
     assert any("wood.png" in n.text for n in house.notes if n.kind == "missing-texture")
 
 
-def test_ior_and_specular_say_what_a_dielectric_reflects() -> None:
-    own = {"KHR_materials_ior": {"ior": 2.0}, "KHR_materials_specular": {"specularFactor": 0.5}}
-    paint = {PBR: {"metallicFactor": 0, "roughnessFactor": 0.5}, "extensions": own}
+def test_ior_and_specular_give_a_dielectrics_reflectance() -> None:
+    extensions = {
+        "KHR_materials_ior": {"ior": 2.0},
+        "KHR_materials_specular": {"specularFactor": 0.5},
+    }
+    paint = {PBR: {"metallicFactor": 0, "roughnessFactor": 0.5}, "extensions": extensions}
     specular = linear_from_srgb(np.array(board(read(scene_with(paint)))[1].specular))
     assert specular == pytest.approx([0.5 / 9] * 3, abs=1e-6)
 
 
-def test_metal_without_a_picture_of_colour_follows_the_mean_of_its_own() -> None:
+def test_metal_without_a_colour_picture_takes_the_mean_of_its_metal_picture() -> None:
     metal = {PBR: {"baseColorFactor": [0.9, 0.6, 0.2, 1], "metallicRoughnessTexture": {"index": 0}}}
     assert board(read(scene_with(metal, png(rgb=(0, 128, 255)))))[1].is_metal
     assert not board(read(scene_with(metal, png(rgb=(0, 128, 0)))))[1].is_metal
@@ -113,8 +118,8 @@ def test_a_surface_shines_by_the_mean_of_its_emissive_picture() -> None:
 
 
 def test_a_transform_may_name_other_texture_coordinates() -> None:
-    other = {"KHR_texture_transform": {"texCoord": 1}}
-    s = scene_with({PBR: {"baseColorTexture": {"index": 0, "extensions": other}}}, png())
+    transform = {"KHR_texture_transform": {"texCoord": 1}}
+    s = scene_with({PBR: {"baseColorTexture": {"index": 0, "extensions": transform}}}, png())
     attributes = s.meshes[-1]["primitives"][0]["attributes"]
     uvs = np.array([[0, 3], [3, 3], [3, 0], [0, 0]], np.float32)
     attributes["TEXCOORD_1"] = s.writer.add_vertices(uvs)
@@ -132,8 +137,8 @@ def quarters() -> bytes:
     return buffer.getvalue()
 
 
-def seen(surface: Surface, x: float, y: float) -> tuple[int, int, int]:
-    """What a board shows at a point of it, its nearest texel, the picture repeating as surfaces do."""
+def colour_at(surface: Surface, x: float, y: float) -> tuple[int, int, int]:
+    """Colour of the board at a point: its nearest texel, with the picture repeated."""
     assert surface.uvs is not None
     p = surface.positions[:, :2].astype(np.float64)
     for a, b, c in surface.faces:
@@ -150,7 +155,7 @@ def seen(surface: Surface, x: float, y: float) -> tuple[int, int, int]:
 @pytest.mark.parametrize(
     ("mode", "number"), [("repeat", 10497), ("clamp", 33071), ("mirror", 33648)]
 )
-def test_a_picture_goes_on_beyond_its_edges_as_its_sampler_says(mode: str, number: int) -> None:
+def test_a_picture_wraps_as_its_sampler_specifies(mode: str, number: int) -> None:
     s = scene_with({PBR: {"baseColorTexture": {"index": 0}, "metallicFactor": 0}}, quarters())
     s.more["samplers"] = [{"wrapS": number, "wrapT": number}]
     s.more["textures"] = [{"source": 0, "sampler": 0}]
@@ -168,7 +173,7 @@ def test_a_picture_goes_on_beyond_its_edges_as_its_sampler_says(mode: str, numbe
             "mirror": lambda t: min(1 - abs(1 - t % 2), 0.999),
         }  # fmt: skip
         row, column = (int(ways[mode](t) * 4) for t in (down, u))
-        assert seen(surface, x, y) == tuple(texels[row, column]), (x, y)
+        assert colour_at(surface, x, y) == tuple(texels[row, column]), (x, y)
     area = np.cross(
         *(
             surface.positions[surface.faces[:, k]] - surface.positions[surface.faces[:, 0]]
@@ -179,7 +184,7 @@ def test_a_picture_goes_on_beyond_its_edges_as_its_sampler_says(mode: str, numbe
     assert not house.notes
 
 
-def test_a_mirrored_picture_that_goes_on_a_hundred_times_repeats_with_a_note() -> None:
+def test_a_mirrored_picture_with_a_hundred_repeats_is_repeated_plainly_with_a_note() -> None:
     s = scene_with({PBR: {"baseColorTexture": {"index": 0}, "metallicFactor": 0}}, quarters())
     s.more |= {"samplers": [{"wrapS": 33648}], "textures": [{"source": 0, "sampler": 0}]}
     uvs = np.array([[0, 1], [100, 1], [100, 0], [0, 0]], np.float32)

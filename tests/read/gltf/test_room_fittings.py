@@ -1,4 +1,4 @@
-"""What stands in a room that is one mesh is no wall, floor or ceiling: windows, slats, skirting."""
+"""Fittings of a one-mesh room (windows, slats, skirting) are not walls, floor or ceiling."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def _box(low: tuple[float, ...], high: tuple[float, ...]) -> list[Quad]:
 
 
 def _room() -> Scene:
-    """A room of 4 x 2.6 x 3 m whose sheets do not touch, with a window and slats, all one mesh."""
+    """A room of 4 x 2.6 x 3 m of separate sheets, with a window and slats, all in one mesh."""
     scene = Scene()
     scene.materials = [{"name": name} for name in MATERIALS]
     e = 0.01

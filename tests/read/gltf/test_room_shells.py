@@ -1,4 +1,4 @@
-"""Rooms drawn as one mesh: floor, walls and ceiling that look inward are no block."""
+"""Rooms drawn as one mesh: floor, walls and ceiling that face inwards are no solid block."""
 
 from __future__ import annotations
 
@@ -34,16 +34,16 @@ def _with_table(scene: Scene) -> Scene:
 
 
 def one_mesh(name: str, *, inward: bool = True, leave_out: int | None = None) -> Scene:
-    """A room of 4 x 3 x 2.6 m as one mesh; leave_out: number of the side it lacks."""
+    """A room of 4 x 3 x 2.6 m as one mesh; leave_out: index of the missing side."""
     scene = Scene()
     quads = box_quads((0, 0, 0), tuple(SIZE), inward=inward)
-    kept = [q for k, q in enumerate(quads) if k != leave_out]
-    scene.node(name, mesh=scene.mesh(kept))
+    side_quads = [q for k, q in enumerate(quads) if k != leave_out]
+    scene.node(name, mesh=scene.mesh(side_quads))
     return _with_table(scene)
 
 
 def three_materials(name: str) -> Scene:
-    """The same room with a material each for floor, walls and ceiling, its front wall open."""
+    """The same room with one material each for floor, walls and ceiling, and no front wall."""
     scene = Scene()
     scene.materials = [{"name": n} for n in ("Wall_paint", "Oak floor", "Ceiling.001")]
     quads = box_quads((0, 0, 0), tuple(SIZE), inward=True)
@@ -56,7 +56,7 @@ def three_materials(name: str) -> Scene:
 
 
 def hollow(name: str) -> Scene:
-    """A block with a cavity: its outer side looks outward, its inner one inward."""
+    """A block with a cavity: its outer faces look outwards, its inner ones inwards."""
     scene = Scene()
     quads = box_quads((0, 0, 0), tuple(SIZE), inward=True)
     quads += box_quads((-0.3, -0.3, -0.3), tuple(SIZE + 0.3), inward=False)
@@ -97,9 +97,9 @@ def test_a_shell_that_shows_a_room_is_walls_a_floor_and_a_ceiling(scene: Scene) 
     assert report.leaks.n_rays > 1000
     assert report.leaks.n_sky == 0
     assert len(unpaired_edges(after)) == 0
-    # From the middle of the room: all six sides, at the room's own distance.
-    seen = seen_from(after, MIDDLE)
-    assert len(seen) == 6
+    # From the middle of the room all six sides are visible, at the room's dimensions.
+    boxes = seen_from(after, MIDDLE)
+    assert len(boxes) == 6
     down = EmbreeOccluder(after).first_hit(
         np.array([[0.5, 1.3, 0.5]], np.float32), np.array([[0, -1, 0]], np.float32)
     )
@@ -115,19 +115,19 @@ def test_a_room_without_its_front_wall_is_parted_too() -> None:
 
 
 @pytest.mark.parametrize("name", ["Room", "Mesh_1", "Walls"])
-def test_kinds_go_by_the_names_of_materials(name: str) -> None:
+def test_material_names_give_the_kinds(name: str) -> None:
     house = _read(three_materials(name))
     assert _kinds(house) == ["ceiling", "floor", "wall", "wall", "wall"]
     assert len(house.rooms) == 1
 
 
-def test_sheets_of_one_node_that_show_no_room_go_by_their_materials() -> None:
+def test_sheets_of_one_node_without_a_room_are_classified_by_material() -> None:
     scene = Scene()
     scene.materials = [{"name": "Parkett"}, {"name": "Wand weiss"}, {"name": "Sofa leather"}]
     floor = scene.mesh([[[0, 0, 3], [4, 0, 3], [4, 0, 0], [0, 0, 0]]], 0)
     wall = scene.mesh([[[0, 0, 0], [4, 0, 0], [4, 2.5, 0], [0, 2.5, 0]]], 1)
-    both = scene.meshes[floor]["primitives"] + scene.meshes[wall]["primitives"]
-    scene.meshes.append({"primitives": both})
+    primitives = scene.meshes[floor]["primitives"] + scene.meshes[wall]["primitives"]
+    scene.meshes.append({"primitives": primitives})
     scene.node("Object_7", mesh=len(scene.meshes) - 1)
     scene.node("Object_8", mesh=scene.box([1, 0, 1], [3, 0.8, 2], 2))
     house = _read(scene)
@@ -150,7 +150,7 @@ def test_solid_walls_furniture_and_skies_are_no_rooms() -> None:
 
 
 def test_repair_makes_no_block_of_a_shell_that_looks_inward() -> None:
-    # Whatever a reader gives: a wall item that is a room seen from inside is no solid.
+    # For any reader: a wall item whose faces look into a room is no solid.
     quads = np.array(box_quads((0, 0, 0), tuple(SIZE), inward=True))
     inward, outward = (
         Item("w", "w", ItemKind.WALL, "0", (quads_surface("w", q, 0),))

@@ -1,4 +1,4 @@
-"""What a glTF scene holds and nobody reads is told; a window of several nodes is one opening."""
+"""Unread parts of a glTF scene are noted; a window of several nodes is one opening."""
 
 import numpy as np
 import pytest
@@ -18,12 +18,12 @@ HOLE = [
 ]
 
 
-def told(scene: Scene) -> str:
+def notes_text(scene: Scene) -> str:
     notes = [n for n in read(scene).notes if n.kind == "unread-part"]
     return "; ".join(n.text for n in notes)
 
 
-def test_what_is_not_read_is_told_once_each() -> None:
+def test_each_unread_part_is_noted_once() -> None:
     scene = two_rooms()
     for _ in range(3):
         scene.node("chair", mesh=scene.box([1, 0, 1], [1.5, 1, 1.5]))
@@ -31,16 +31,16 @@ def test_what_is_not_read_is_told_once_each() -> None:
     scene.meshes[-2]["primitives"][0]["mode"] = 1
     scene.nodes[-1]["skin"] = 0
     scene.more = {"extensionsUsed": ["EXT_own_shapes", "KHR_lights_punctual"]}
-    text = told(scene)
+    text = notes_text(scene)
     assert "EXT_own_shapes is not read" in text
     assert "KHR_lights_punctual" not in text
     assert "have morph targets" in text
     assert "have points or lines" in text
     assert "have a skin" in text
-    assert told(two_rooms()) == ""
+    assert notes_text(two_rooms()) == ""
 
 
-def test_a_mesh_without_data_says_that_it_is_compressed() -> None:
+def test_a_mesh_without_data_is_reported_as_compressed() -> None:
     scene = two_rooms()
     data = scene.glb()
     bad = data.replace(b'"bufferView":0,', b'"bufferVie_":0,', 1)
@@ -49,7 +49,7 @@ def test_a_mesh_without_data_says_that_it_is_compressed() -> None:
 
 
 @pytest.mark.parametrize("size", [100.0, 0.01])
-def test_a_scene_in_other_units_is_told_its_size(size: float) -> None:
+def test_a_scene_in_other_units_is_refused_with_its_size(size: float) -> None:
     scene = Scene()
     quads = np.array([[[0, 0, 0], [0, 3, 0], [3, 3, 0], [3, 0, 0]]]) * size
     scene.node("thing", mesh=scene.mesh(quads.tolist()))

@@ -1,1 +1,1 @@
-"""Tests of the reader of Habitat scenes."""
+"""Tests of the Habitat reader."""

@@ -1,4 +1,4 @@
-"""Articulated objects of a Habitat scene: where their links stand, and what moves of them."""
+"""Articulated objects of a Habitat scene: placement of links, and their joints."""
 
 from __future__ import annotations
 
@@ -58,18 +58,18 @@ def bounds(item: Item, part: str) -> list[list[float]]:
     return [points.min(0).tolist(), points.max(0).tolist()]
 
 
-def test_links_stand_where_their_joints_say_and_move(tmp_path: Path) -> None:
-    found = cupboard(scene(tmp_path))
-    assert found.nyu40 == 3
-    assert bounds(found, "") == pytest.approx(np.array([[1.6, 0, 1.2], [2.4, 0.6, 1.8]]), abs=1e-6)
-    # Half of it is in front of the body's front, 0.3 m before its middle.
+def test_joints_place_links_and_give_their_motion(tmp_path: Path) -> None:
+    parts = cupboard(scene(tmp_path))
+    assert parts.nyu40 == 3
+    assert bounds(parts, "") == pytest.approx(np.array([[1.6, 0, 1.2], [2.4, 0.6, 1.8]]), abs=1e-6)
+    # Its box reaches half a depth beyond the body's middle, 0.3 m.
     shut = np.array([[1.6, 0, 1.19], [2.0, 0.6, 1.21]])
-    assert bounds(found, "door") == pytest.approx(shut, abs=1e-6)
-    joints = {joint.part: joint for joint in found.joints}
+    assert bounds(parts, "door") == pytest.approx(shut, abs=1e-6)
+    joints = {joint.part: joint for joint in parts.joints}
     assert joints["door"].kind is JointKind.REVOLUTE
     assert joints["door"].point == pytest.approx((1.6, 0.3, 1.2))
     assert (joints["door"].axis, joints["door"].upper) == ((0, 1, 0), 1.6)
-    # A rail that opens to its negative side opens from 0.
+    # A rail with a negative range opens from 0.
     assert joints["drawer"].axis == pytest.approx((0, 0, -1))
     assert (joints["drawer"].lower, joints["drawer"].upper) == (0, 0.35)
     assert joints["drawer"].mass_kg > 0
@@ -84,13 +84,13 @@ def test_links_stand_where_their_joints_say_and_move(tmp_path: Path) -> None:
     ],
 )
 def test_a_pose_opens_them(tmp_path: Path, row: dict[str, Any]) -> None:
-    found = cupboard(scene(tmp_path, **row))
-    # A quarter turn about y takes +x to -z: the leaf stands out before the hinge.
+    parts = cupboard(scene(tmp_path, **row))
+    # A quarter turn about y takes +x to -z: the open leaf is in front of the hinge.
     turned = np.array([[1.59, 0, 0.8], [1.61, 0.6, 1.2]])
-    assert bounds(found, "door") == pytest.approx(turned, abs=1e-6)
+    assert bounds(parts, "door") == pytest.approx(turned, abs=1e-6)
     drawn = np.array([[2.0, 0.2, 1.1], [2.4, 0.4, 1.5]])
-    assert bounds(found, "drawer") == pytest.approx(drawn, abs=1e-6)
-    values = {joint.part: joint.value for joint in found.joints}
+    assert bounds(parts, "drawer") == pytest.approx(drawn, abs=1e-6)
+    values = {joint.part: joint.value for joint in parts.joints}
     assert values == pytest.approx({"door": np.pi / 2, "drawer": 0.2})
 
 
@@ -99,23 +99,25 @@ def test_shut_again_it_is_as_without_a_pose(tmp_path: Path) -> None:
     joint = next(j for j in opened.joints if j.part == "door")
     points = np.concatenate([s.positions for s in opened.surfaces if s.part == "door"])
     shut = points @ joint.motion(0.0)[:3, :3].T + joint.motion(0.0)[:3, 3]
-    own = bounds(cupboard(scene(tmp_path / "b")), "door")
-    assert [shut.min(0).tolist(), shut.max(0).tolist()] == pytest.approx(np.array(own), abs=1e-5)
+    door_bounds = bounds(cupboard(scene(tmp_path / "b")), "door")
+    assert [shut.min(0).tolist(), shut.max(0).tolist()] == pytest.approx(
+        np.array(door_bounds), abs=1e-5
+    )
 
 
 def test_an_object_scales_and_turns_with_its_joints(tmp_path: Path) -> None:
     half = float(np.sqrt(0.5))
-    found = cupboard(scene(tmp_path, uniform_scale=0.5, rotation=[half, 0, half, 0]))
-    joints = {joint.part: joint for joint in found.joints}
+    parts = cupboard(scene(tmp_path, uniform_scale=0.5, rotation=[half, 0, half, 0]))
+    joints = {joint.part: joint for joint in parts.joints}
     # A quarter turn about y takes (x, y, z) to (z, y, -x).
     assert joints["door"].point == pytest.approx((2 - 0.15, 0.15, 1.5 + 0.2), abs=1e-6)
     assert joints["drawer"].axis == pytest.approx((-1, 0, 0), abs=1e-6)
     assert joints["drawer"].upper == pytest.approx(0.175)
 
 
-def test_the_pose_of_a_slide_is_in_metres_whatever_the_scale(tmp_path: Path) -> None:
-    found = cupboard(scene(tmp_path, uniform_scale=0.5, initial_joint_pose=[1.0, -0.1]))
-    joints = {joint.part: joint for joint in found.joints}
+def test_the_pose_of_a_slide_is_in_metres_at_any_scale(tmp_path: Path) -> None:
+    parts = cupboard(scene(tmp_path, uniform_scale=0.5, initial_joint_pose=[1.0, -0.1]))
+    joints = {joint.part: joint for joint in parts.joints}
     assert joints["drawer"].value == pytest.approx(0.1)
     assert joints["drawer"].upper == pytest.approx(0.175)
     assert joints["door"].value == pytest.approx(1.0)
@@ -127,9 +129,9 @@ def test_a_config_names_its_urdf(tmp_path: Path) -> None:
     assert any(i.name == "cabinet_3" and len(i.joints) == 2 for i in house(path).items)
 
 
-def test_what_is_not_here_is_a_note(tmp_path: Path) -> None:
-    found = house(scene(tmp_path, template_name="elsewhere"))
-    assert [n.kind for n in found.notes if "articulated" in n.place] == ["missing-model"]
+def test_missing_parts_are_notes(tmp_path: Path) -> None:
+    read_house = house(scene(tmp_path, template_name="elsewhere"))
+    assert [n.kind for n in read_house.notes if "articulated" in n.place] == ["missing-model"]
 
 
 def test_a_change_of_the_urdf_or_its_models_is_seen(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""A Habitat scene: stage, objects, regions, and what is refused."""
+"""A Habitat scene: stage, objects, regions, and refused files."""
 
 from __future__ import annotations
 
@@ -22,15 +22,15 @@ def house(path: Path) -> House:
     return read_house(resolve(str(path)), ReadFields())
 
 
-def test_an_object_stands_where_its_instance_says_upright_and_in_metres(tmp_path: Path) -> None:
+def test_an_instance_places_an_object_upright_and_in_metres(tmp_path: Path) -> None:
     sofa = item(house(dataset(tmp_path)), "couch")
     assert sofa.bounds == pytest.approx(np.array([[1.6, 0, 0.5], [2.4, 0.6, 2.5]]), abs=1e-6)
     assert sofa.nyu40 == 6
 
 
 def test_regions_are_the_rooms(tmp_path: Path) -> None:
-    found = house(dataset(tmp_path))
-    assert [(r.types, r.ceiling_y) for r in found.rooms] == [
+    regions_house = house(dataset(tmp_path))
+    assert [(r.types, r.ceiling_y) for r in regions_house.rooms] == [
         (("kitchen",), 2.6),
         (("bedroom",), 2.6),
     ]
@@ -57,7 +57,7 @@ def lit(folder: Path, lights: object) -> House:
     return house(dataset(folder, default_lighting="lighting/day"))
 
 
-def test_point_lights_are_lamps_of_a_bulb_each_and_others_are_told(tmp_path: Path) -> None:
+def test_point_lights_become_lamps_of_one_bulb_and_others_are_noted(tmp_path: Path) -> None:
     rows = {
         "0": {"type": "point", "position": [1, 2.3, 1], "intensity": 1.0, "color": [1, 0.5, 0.25]},
         "1": {"type": "point", "position": [5, 2.3, 1], "intensity": 3.0, "color": [1, 1, 1]},
@@ -65,18 +65,18 @@ def test_point_lights_are_lamps_of_a_bulb_each_and_others_are_told(tmp_path: Pat
         "3": {"type": "directional", "direction": [0, -1, 0], "intensity": 2.0},
         "4": {"type": "point", "position": [0, 0, 0], "position_model": "camera"},
     }
-    found = lit(tmp_path, rows)
-    first, second = (light for thing in found.items for light in thing.lights)
+    lamps = lit(tmp_path, rows)
+    first, second = (light for thing in lamps.items for light in thing.lights)
     assert (first.power, second.power) == (800, 800)
     assert first.position == pytest.approx((1, 2.3, 1))
     assert first.rgb_linear == pytest.approx((1, 0.5, 0.25))
-    assert [n.text for n in found.notes if "lights" in n.place] == [
+    assert [n.text for n in lamps.notes if "lights" in n.place] == [
         "3 are directional, dark or not of the room; left out"
     ]
 
 
 @pytest.mark.parametrize("lights", [[1], {"0": 3}, {"0": {"intensity": "x"}}])
-def test_damaged_lights_are_one_line(tmp_path: Path, lights: object) -> None:
+def test_damaged_lights_are_refused_in_one_line(tmp_path: Path, lights: object) -> None:
     with pytest.raises(BadHouse, match="lights"):
         lit(tmp_path, lights)
 
@@ -96,12 +96,12 @@ def test_damaged_lights_are_one_line(tmp_path: Path, lights: object) -> None:
         ({"object_instances": "many"}, "expected a list"),
     ],
 )
-def test_a_damaged_scene_is_one_line_with_its_place(tmp_path: Path, scene: dict, said: str) -> None:
+def test_a_damaged_scene_is_refused_with_its_place(tmp_path: Path, scene: dict, said: str) -> None:
     with pytest.raises(BadHouse, match=said):
         house(dataset(tmp_path, **scene))
 
 
-def test_a_scene_outside_its_data_set_is_told_so(tmp_path: Path) -> None:
+def test_a_scene_outside_its_data_set_is_refused(tmp_path: Path) -> None:
     path = written(tmp_path / "one.scene_instance.json", {"stage_instance": {"template_name": "a"}})
     with pytest.raises(BadHouse, match="scene_dataset_config"):
         house(path)

@@ -1,4 +1,4 @@
-"""IFC buildings written row by row, read as houses."""
+"""IFC buildings written row by row and read as houses."""
 
 from __future__ import annotations
 
@@ -35,8 +35,8 @@ def read(house: IfcHouse, folder: Path) -> House:
 
 
 def kinds(house: House) -> dict[str, int]:
-    found = [i.kind.value for i in house.items]
-    return {k: found.count(k) for k in sorted(set(found))}
+    kind_values = [i.kind.value for i in house.items]
+    return {k: kind_values.count(k) for k in sorted(set(kind_values))}
 
 
 @pytest.mark.parametrize("unit", ["mm", "m"])
@@ -70,7 +70,7 @@ def test_a_window_without_a_style_has_its_thin_part_for_a_pane(tmp_path: Path) -
     assert all(np.ptp(s.positions[:, 2]) == pytest.approx(0.02, abs=1e-4) for s in panes)
 
 
-def test_without_slabs_the_spaces_have_floors_and_ceilings_of_their_own(tmp_path: Path) -> None:
+def test_without_slabs_the_spaces_get_floors_and_ceilings(tmp_path: Path) -> None:
     building = IfcHouse()
     building.storey("EG", None)
     storey_of_two_rooms(building, 0.0, slab=False)
@@ -78,7 +78,7 @@ def test_without_slabs_the_spaces_have_floors_and_ceilings_of_their_own(tmp_path
     assert kinds(house)["floor"] == kinds(house)["ceiling"] == 2
 
 
-def test_without_spaces_rooms_are_what_walls_and_slabs_enclose(tmp_path: Path) -> None:
+def test_without_spaces_walls_and_slabs_enclose_rooms(tmp_path: Path) -> None:
     building = two_rooms(spaces=False)
     terrace = building.box_solid((0, -4, -0.25), (7.6, 0, 0))
     building.product("IfcSlab", "Terrace", [terrace], PredefinedType="FLOOR")
@@ -110,7 +110,7 @@ def test_coordinates_of_a_country_are_moved_to_the_origin(tmp_path: Path) -> Non
     assert areas == pytest.approx([12, 9], abs=1e-3)
 
 
-def test_classes_go_by_entity_then_predefined_type_then_words(tmp_path: Path) -> None:
+def test_classes_follow_entity_then_predefined_type_then_words(tmp_path: Path) -> None:
     building = two_rooms()
     solid = lambda: [building.box_solid((0, 0, 0), (0.6, 0.6, 0.5))]  # noqa: E731
     building.product("IfcSanitaryTerminal", "S 12", solid(), (1, 1, 0), PredefinedType="TOILETPAN")
@@ -120,12 +120,12 @@ def test_classes_go_by_entity_then_predefined_type_then_words(tmp_path: Path) ->
     lawn = [building.box_solid((0, 0, 0), (6, 6, 0.02))]
     building.product("IfcBuildingElementProxy", "Surface:Grass:143210", lawn, (9, 0, -0.1))
     house = read(building, tmp_path)
-    found = {i.name: (i.nyu40, i.kind.value, i.room_id) for i in house.items}
-    assert found["S 12"] == (33, "object", "0_0")
-    assert found["Sessel 3"] == (5, "object", "0_0")
-    assert found["Xyzzy"] == (40, "object", "0_0")
-    assert found["L"] == (35, "lamp", "0_0")
-    assert found["Surface:Grass:143210"][:2] == (2, "ground")
+    by_name = {i.name: (i.nyu40, i.kind.value, i.room_id) for i in house.items}
+    assert by_name["S 12"] == (33, "object", "0_0")
+    assert by_name["Sessel 3"] == (5, "object", "0_0")
+    assert by_name["Xyzzy"] == (40, "object", "0_0")
+    assert by_name["L"] == (35, "lamp", "0_0")
+    assert by_name["Surface:Grass:143210"][:2] == (2, "ground")
     assert [n.kind for n in house.notes] == ["unmapped-class"]
 
 
@@ -136,7 +136,7 @@ def test_a_curtain_walls_glass_plates_are_windows(tmp_path: Path) -> None:
     for k, style in enumerate(("glass", "")):
         solid = building.box_solid((0, 0, 0), (1, 0.02, 2), style)
         parts.append(building.product("IfcPlate", f"P{k}", [solid], (k, -1, 0)))
-    building._contained.clear()  # parts belong to their wall alone
+    building.contained.clear()  # each part is contained only in its wall
     building.row("IfcRelAggregates", RelatingObject=wall, RelatedObjects=parts)
     house = read(building, tmp_path)
     assert {i.name: i.kind.value for i in house.items if i.name[0] == "P"} == {
@@ -145,7 +145,7 @@ def test_a_curtain_walls_glass_plates_are_windows(tmp_path: Path) -> None:
     }
 
 
-def test_names_that_one_program_writes_as_a_star_do_not_lose_products(tmp_path: Path) -> None:
+def test_names_written_as_a_star_lose_no_products(tmp_path: Path) -> None:
     text = two_rooms().text()
     broken = text.replace("'South'", "*").replace("'Door'", "*")
     assert broken != text
@@ -195,7 +195,7 @@ def test_a_zipped_building_is_read(tmp_path: Path) -> None:
 
 
 def _cyclic(text: str) -> str:
-    """A placement that stands in itself."""
+    """A placement that is relative to itself."""
     rows = text.splitlines()
     k = next(i for i, r in enumerate(rows) if "IFCLOCALPLACEMENT(" in r)
     number = rows[k].split("=")[0]
@@ -213,7 +213,7 @@ def _cyclic(text: str) -> str:
         ("IFC4X3_RC2", "IFC4X3_ADD2"),
     ],
 )
-def test_older_and_draft_schemas_are_read_as_the_one_of_their_family(
+def test_older_and_draft_schemas_are_read_as_their_family(
     tmp_path: Path, written: str, schema: str
 ) -> None:
     building = IfcHouse(schema="IFC2X3" if schema == "IFC2X3" else "IFC4")
@@ -246,7 +246,7 @@ DAMAGED = {
 
 
 @pytest.mark.parametrize("case", DAMAGED)
-def test_a_damaged_file_is_one_line_that_names_the_place(tmp_path: Path, case: str) -> None:
+def test_a_damaged_file_is_refused_with_its_place(tmp_path: Path, case: str) -> None:
     damage, text = DAMAGED[case]
     path = tmp_path / "a.ifc"
     path.write_text(damage(two_rooms().text()))

@@ -1,4 +1,4 @@
-"""What hangs over the rooms of an IFC building: sloped roofs, suspended ceilings, slabs that are roofs."""
+"""Ceilings of an IFC building: sloped roofs, suspended ceilings, slabs that act as roofs."""
 
 from __future__ import annotations
 
@@ -89,7 +89,7 @@ CEILINGS: dict[str, tuple[str, str, dict[str, Any]]] = {
 
 @pytest.mark.quick(2)
 @pytest.mark.parametrize("how", CEILINGS)
-def test_a_room_is_as_high_as_the_ceiling_that_hangs_there(tmp_path: Path, how: str) -> None:
+def test_a_suspended_ceiling_sets_the_height_of_a_room(tmp_path: Path, how: str) -> None:
     entity, name, fields = CEILINGS[how]
     building = IfcHouse()
     building.storey("EG", 0.0)
@@ -118,7 +118,7 @@ def test_the_slab_on_top_is_a_roof_with_no_room_on_it(
         storey_of_two_rooms(building, 2.85 * k, spaces=spaces)
     solid = building.box_solid((0, 0, 0), (7.6, 3.4, 0.25))
     building.product("IfcSlab", name, [solid], (0, 0, 5.45), **fields)
-    # A parapet of 1 m stands on it.
+    # Add a parapet of 1 m on top.
     building.wall("Parapet", (0, 0), (7.6, 0), 5.7, 1.0)
     house = read(building, tmp_path)
     assert [r.level_id for r in house.rooms] == ["0", "0", "1", "1"]
@@ -142,7 +142,7 @@ def test_a_space_on_a_roof_under_the_sky_is_no_room(tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("has_spaces", [True, False])
-def test_a_slab_that_carries_a_storey_is_no_roof_whatever_it_is_called(
+def test_a_slab_that_carries_a_storey_is_no_roof_under_any_name(
     tmp_path: Path, has_spaces: bool
 ) -> None:
     building = IfcHouse()
@@ -157,12 +157,12 @@ def test_a_slab_that_carries_a_storey_is_no_roof_whatever_it_is_called(
     assert np.ptp([i.bounds[1, 1] for i in slabs]) == pytest.approx(2.85)
 
 
-def test_a_roof_beside_a_higher_house_carries_no_storey(tmp_path: Path) -> None:
+def test_a_roof_next_to_a_higher_house_carries_no_storey(tmp_path: Path) -> None:
     building = IfcHouse()
     for k in range(2):
         building.storey(f"{k}. OG", 2.85 * k)
         storey_of_two_rooms(building, 2.85 * k, spaces=False)
-    # A garage, its roof laid into the wall of the house.
+    # A garage whose roof is embedded in the wall of the house.
     building.wall("Garage", (11.0, 0), (11.0, 3.4), 0.0, 2.4)
     roof_slab = building.box_solid((7.5, 0, 0), (11.0, 3.4, 0.2))
     building.product("IfcSlab", "Garage roof", [roof_slab], (0, 0, 2.4))

@@ -1,4 +1,4 @@
-"""Doors, windows and the holes of an IFC building, by its relations, its names and its shapes."""
+"""Doors, windows and holes of an IFC building, from its relations, names and shapes."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from tests.inputs.ifc_files import IfcHouse, roof, storey_of_two_rooms
 
 
 def a_room(at: tuple[float, float, float] = (0, 0, 0)) -> tuple[IfcHouse, Any]:
-    """A building of two rooms, and a wall before its south one to make holes in."""
+    """A building of two rooms, and a wall in front of its south side to cut holes into."""
     building = IfcHouse(at=at)
     building.storey("EG", 0.0)
     storey_of_two_rooms(building, 0.0)
@@ -29,12 +29,12 @@ def read(house: IfcHouse, folder: Path) -> House:
 
 
 def in_front(house: House) -> list[Opening]:
-    """The openings of the wall in front of the house, which stands 1.8 to 2 m before it."""
+    """The openings of the wall 1.8 to 2 m in front of the house."""
     return [o for o in house.openings if o.quad[:, 2].min() > 1.5]
 
 
 def size_of(opening: Opening) -> list[float]:
-    """Width, height and depth of what fills the hole."""
+    """Width, height and depth of the filling of the hole."""
     axes = np.stack([np.cross([0, 1, 0], opening.normal), [0, 1, 0], opening.normal], 1)
     return [round(float(e), 2) for e in np.ptp(opening.cutter.positions @ axes, axis=0)]
 
@@ -53,7 +53,7 @@ def test_a_slit_of_a_window_in_a_thick_wall_is_found_by_its_relation(tmp_path: P
 
 def test_a_door_on_a_higher_floor_than_its_wall_has_its_opening(tmp_path: Path) -> None:
     building, _ = a_room()
-    # Floors 0.6 m apart are levels of their own: the door stands on the upper, its wall on the lower.
+    # Floors 0.6 m apart are separate levels: the door is on the upper, its wall on the lower.
     building.space("Podest", [(-6, -1.8), (0, -1.8), (0, 0), (-6, 0)], 0.6, 2.0)
     wall = building.wall("Back", (-6, -4), (0, -4), 0.0, 2.6)
     hole = building.hole(wall, 2.0, 0.9, 0.6, 1.9)
@@ -63,7 +63,7 @@ def test_a_door_on_a_higher_floor_than_its_wall_has_its_opening(tmp_path: Path) 
     assert door.GlobalId in {o.item_id for o in house.openings}
 
 
-def test_a_hole_without_a_filling_is_an_open_hole_and_a_niche_is_none(tmp_path: Path) -> None:
+def test_an_unfilled_hole_is_an_opening_and_a_niche_is_not(tmp_path: Path) -> None:
     building, wall = a_room()
     building.hole(wall, 1.0, 0.9, 0.0, 2.0)
     niche = building.hole(wall, 3.0, 0.9, 0.5, 1.0)
@@ -75,12 +75,12 @@ def test_a_hole_without_a_filling_is_an_open_hole_and_a_niche_is_none(tmp_path: 
     assert size_of(opening) == [0.9, 2.0, 0.2]
 
 
-def test_a_door_whose_wall_is_gone_beside_it_keeps_its_opening(tmp_path: Path) -> None:
+def test_a_door_whose_wall_is_missing_keeps_its_opening(tmp_path: Path) -> None:
     building, wall = a_room()
     hole = building.hole(wall, 2.0, 0.9, 0.0, 2.0)
     leaf = building.box_solid((0, 0.08, 0), (0.9, 0.12, 2.0))
     door = building.fill(hole, "IfcDoor", "Door", [leaf])
-    # A passage takes its jambs and its lintel away.
+    # A passage removes its jambs and lintel.
     building.hole(wall, 1.9, 2.1, 0.0, 2.4)
     of_item = {o.item_id: o for o in in_front(read(building, tmp_path))}
     assert size_of(of_item[door.GlobalId]) == [0.9, 2.0, 0.2]
@@ -88,7 +88,7 @@ def test_a_door_whose_wall_is_gone_beside_it_keeps_its_opening(tmp_path: Path) -
     assert [o.is_cut for o in of_item.values()] == [True, True]
 
 
-def test_two_leaves_of_a_wall_with_a_hole_each_have_one_opening(tmp_path: Path) -> None:
+def test_holes_in_both_leaves_of_a_wall_are_one_opening(tmp_path: Path) -> None:
     building, wall = a_room()
     outer = building.wall("Outer", (-6, -2.1), (0, -2.1), 0.0, 2.6, thick=0.1)
     hole = building.hole(wall, 2.0, 1.0, 0.9, 1.0)
@@ -105,17 +105,17 @@ def test_a_door_or_window_without_a_shape_is_built_to_its_hole(tmp_path: Path, e
     building, wall = a_room()
     hole = building.hole(wall, 2.0, 1.0, 0.0, 2.0)
     leaf = building.box_solid((0, 0.09, 0), (1.0, 0.11, 2.0))
-    found = building.fill(hole, entity, "D 7", [leaf])
-    found.Representation = None
+    filling = building.fill(hole, entity, "D 7", [leaf])
+    filling.Representation = None
     house = read(building, tmp_path)
     (opening,) = in_front(house)
     item = next(i for i in house.items if i.id == opening.item_id)
-    assert (item.id, item.kind.value) == (found.GlobalId, entity.removeprefix("Ifc").lower())
+    assert (item.id, item.kind.value) == (filling.GlobalId, entity.removeprefix("Ifc").lower())
     assert np.ptp(item.bounds, axis=0)[:2] == pytest.approx([1.0, 2.0], abs=0.02)
     assert item.tags == ("made",)
 
 
-# Name, sill, height, what the entity says -> what it is.
+# Name, sill, height, predefined type -> expected kind.
 NAMES = [
     ("M_Single-Flush:0864 x 2032mm:1423", 0.0, 2.03, "IfcWindow", "door"),
     ("Sliding-Closet:72 x 84", 0.0, 2.1, "IfcWindow", "door"),
@@ -149,7 +149,7 @@ def test_names_and_sills_tell_doors_from_windows_that_an_exporter_mixed_up(
     assert item.tags == (("sliding",) if "Sliding" in name or "Bifold" in name else ())
 
 
-def test_a_window_that_is_typed_as_a_door_is_one(tmp_path: Path) -> None:
+def test_a_window_typed_as_a_door_is_a_window(tmp_path: Path) -> None:
     building, wall = a_room()
     hole = building.hole(wall, 2.0, 0.8, 0.0, 2.0)
     leaf = building.box_solid((0, 0.09, 0), (0.8, 0.11, 2.0))

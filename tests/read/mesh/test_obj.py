@@ -1,4 +1,4 @@
-"""OBJ and MTL: every index form, every quirk of the models people share."""
+"""OBJ and MTL: every form of index, and the quirks of published models."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ def test_a_byte_order_mark_hides_no_line(first: str) -> None:
     assert (material.name, material.kd) == ("a", (1.0, 0.0, 0.0))
 
 
-def one(text: str) -> Mesh:
+def single_mesh(text: str) -> Mesh:
     (mesh,) = parse_obj(text.encode(), "m.obj").meshes
     return mesh
 
@@ -42,31 +42,31 @@ def area(mesh: Mesh) -> float:
      "-4 -3 -2 -1", "-4/-4/-1 -3/-3/-1 -2/-2/-1 -1/-1/-1", "1/1 2//1 3 4/4/1"],
 )  # fmt: skip
 def test_every_index_form_gives_the_same_triangles(face: str) -> None:
-    mesh = one(QUAD + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\n" + f"f {face}\n")
+    mesh = single_mesh(QUAD + "vt 0 0\nvt 1 0\nvt 1 1\nvt 0 1\nvn 0 0 1\n" + f"f {face}\n")
     assert area(mesh) == pytest.approx(1.0)
     assert np.allclose(mesh.normals, [0, 0, 1])
 
 
 def test_texture_coordinates_stay_with_their_corners() -> None:
-    mesh = one(QUAD + "vt 0 0\nvt 2 0\nvt 2 2\nvt 0 2\nf 1/1 2/2 3/3 4/4\n")
+    mesh = single_mesh(QUAD + "vt 0 0\nvt 2 0\nvt 2 2\nvt 0 2\nf 1/1 2/2 3/3 4/4\n")
     assert mesh.uvs is not None
     assert np.allclose(mesh.uvs, 2 * mesh.positions[:, :2])
 
 
 def test_a_vertex_with_two_texture_coordinates_is_split() -> None:
-    mesh = one(QUAD + "vt 0 0\nvt 1 1\nf 1/1 2/1 3/1\nf 1/2 3/1 4/1\n")
+    mesh = single_mesh(QUAD + "vt 0 0\nvt 1 1\nf 1/1 2/1 3/1\nf 1/2 3/1 4/1\n")
     assert len(mesh.positions) == 5
 
 
 def test_a_concave_polygon_is_ear_cut_not_fanned() -> None:
     arrow = "v 0 0 0\nv 4 0 0\nv 4 4 0\nv 2 1 0\nv 0 4 0\n"
-    mesh = one(arrow + "f 1 2 3 4 5\n")
+    mesh = single_mesh(arrow + "f 1 2 3 4 5\n")
     assert area(mesh) == pytest.approx(10.0)
-    mesh = one("v 0 0 0\nv 2 1 0\nv 0 2 0\nv 1 1 0\nf 1 2 3 4\n")
+    mesh = single_mesh("v 0 0 0\nv 2 1 0\nv 0 2 0\nv 1 1 0\nf 1 2 3 4\n")
     assert area(mesh) == pytest.approx(1.0)
 
 
-def test_polygons_keep_their_order_and_winding_whatever_their_size() -> None:
+def test_polygons_of_any_size_keep_their_order_and_winding() -> None:
     angles = 2 * np.pi * np.arange(7) / 7
     ring = np.stack([np.cos(angles), np.sin(angles), 0 * angles], -1)
     positions = np.concatenate([ring[:3], ring[:5], ring, ring[:4]])
@@ -82,18 +82,18 @@ def test_without_normals_a_box_is_sharp_and_a_fine_cylinder_smooth() -> None:
     for mesh, smooth in ((box, False), (cylinder, True)):
         text = "".join(f"v {x} {y} {z}\n" for x, y, z in mesh.vertices)
         text += "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in mesh.faces)
-        read = one(text)
+        read = single_mesh(text)
         flat = trimesh.Trimesh(read.positions, read.faces, process=False).face_normals
         dots = (read.normals[read.faces] * flat[:, None]).sum(-1)
         assert dots.min() > math.cos(math.pi / 32) - 1e-6
         assert bool(dots.min() < 1 - 1e-6) is smooth
 
 
-def test_flat_shading_is_kept_where_the_file_says_so() -> None:
+def test_flat_shading_of_the_file_is_kept() -> None:
     cylinder = trimesh.creation.cylinder(1, 1, sections=32)
     text = "s off\n" + "".join(f"v {x} {y} {z}\n" for x, y, z in cylinder.vertices)
     text += "".join(f"f {a + 1} {b + 1} {c + 1}\n" for a, b, c in cylinder.faces)
-    read = one(text)
+    read = single_mesh(text)
     flat = trimesh.Trimesh(read.positions, read.faces, process=False).face_normals
     assert np.allclose((read.normals[read.faces] * flat[:, None]).sum(-1), 1)
 
@@ -113,7 +113,7 @@ def test_groups_and_materials_part_the_meshes() -> None:
 
 def test_lines_points_curves_tabs_and_continuations_are_taken() -> None:
     text = "v\t0 0 0\r\nv 1 0 0 0.5 0.5 0.5\r\nv 1 1 \\\r\n0\nl 1 2\np 1\ncurv 0 1 1 2\nf\t1 2 3\n"
-    assert area(one(text)) == pytest.approx(0.5)
+    assert area(single_mesh(text)) == pytest.approx(0.5)
 
 
 def test_faces_without_area_are_dropped_and_counted() -> None:
@@ -140,14 +140,14 @@ def test_a_bad_obj_is_refused_with_its_place(text: str, what: str) -> None:
 
 
 def test_faces_without_texture_coordinates_leave_those_of_the_others() -> None:
-    mesh = one(QUAD + "vt 0.5 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\nf 1 3 4\n")
+    mesh = single_mesh(QUAD + "vt 0.5 0\nvt 1 0\nvt 1 1\nf 1/1 2/2 3/3\nf 1 3 4\n")
     assert mesh.uvs is not None
     assert sorted(map(tuple, mesh.uvs[mesh.faces[0]].tolist())) == [(0.5, 0), (1, 0), (1, 1)]
     assert not mesh.uvs[mesh.faces[1]].any()
 
 
 def test_a_texture_index_out_of_range_costs_only_the_texture() -> None:
-    mesh = one(QUAD + "vt 0 0\nf 1/1 2/7 3/1\n")
+    mesh = single_mesh(QUAD + "vt 0 0\nf 1/1 2/7 3/1\n")
     assert mesh.uvs is None
 
 
@@ -167,7 +167,7 @@ def test_mtl_lines_are_read_and_nonsense_is_passed_over() -> None:
     assert (blue.kd, blue.ns, blue.d, blue.map_d) == ((0.8, 0.8, 0.8), 0, 1, "mask.png")
 
 
-def test_what_an_mtl_says_of_its_pictures_place_is_read_and_the_rest_is_named() -> None:
+def test_an_mtl_places_its_pictures_and_unread_options_are_noted() -> None:
     wood, plain = parse_mtl(
         b"newmtl wood\nmap_Kd -o 0.25 -s 2 3 1 -clamp on a.png\nKe 1 1 1\nmap_Bump -bm 2 b.png\n"
         b"newmtl plain\nmap_Kd -clamp off a.png\nKe 0 0 0\nNi 1.4\nillum 2\n"
@@ -197,7 +197,7 @@ def test_built_in_colours_are_linear_and_those_of_an_mtl_are_not() -> None:
 
 
 def test_no_built_in_material_is_read_as_a_metal() -> None:
-    # What reflects more than a fifth, and four times its colour, is one (transport/scene_tables).
+    # A metal reflects more than a fifth, and four times its colour (transport/scene_tables).
     for material in builtin_materials().values():
         assert linear_from_srgb(np.array(material.ks)) @ LUMINANCE < 0.2, material.name
 

@@ -1,1 +1,1 @@
-"""Tests of the reader of MuJoCo models."""
+"""Tests of the MuJoCo reader."""

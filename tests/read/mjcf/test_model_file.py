@@ -1,4 +1,4 @@
-"""A home as a model of MuJoCo: what stands where, what moves, what is refused."""
+"""A home as a MuJoCo model: placement, joints, refused files."""
 
 from __future__ import annotations
 
@@ -32,15 +32,15 @@ def bounds(thing: Item, part: str) -> list[list[float]]:
 
 
 def test_bodies_are_items_with_y_up(tmp_path: Path) -> None:
-    found = house(write_model(tmp_path))
-    fridge = item(found, "fridge_1")
-    assert (fridge.nyu40, item(found, "cabinet").nyu40) == (24, 3)
+    bodies_house = house(write_model(tmp_path))
+    fridge = item(bodies_house, "fridge_1")
+    assert (fridge.nyu40, item(bodies_house, "cabinet").nyu40) == (24, 3)
     # (x, y, z) with z up is (x, z, -y) with y up.
     box = np.array([[0.7, 0, -2.9], [1.3, 1.8, -2.3]])
     assert bounds(fridge, "") == pytest.approx(box, abs=1e-6)
-    cup = item(found, "mug")
+    cup = item(bodies_house, "mug")
     assert cup.bounds == pytest.approx(np.array([[2.96, 0.8, -1.04], [3.04, 0.9, -0.96]]), abs=1e-6)
-    kinds = [i.kind for i in found.items]
+    kinds = [i.kind for i in bodies_house.items]
     assert (kinds.count(ItemKind.WALL), kinds.count(ItemKind.CEILING)) == (4, 1)
 
 
@@ -51,27 +51,27 @@ def test_an_endless_floor_makes_a_room(tmp_path: Path) -> None:
     assert (room.floor_y, room.ceiling_y) == pytest.approx((0, 2.5))
 
 
-def test_parts_move_as_their_joints_say(tmp_path: Path) -> None:
-    found = house(write_model(tmp_path))
-    (door,) = item(found, "fridge_1").joints
+def test_joints_move_their_parts(tmp_path: Path) -> None:
+    parts_house = house(write_model(tmp_path))
+    (door,) = item(parts_house, "fridge_1").joints
     assert (door.kind, door.part, door.upper) == (JointKind.REVOLUTE, "fridge_1_door", 2)
     assert door.point == pytest.approx((1.3, 0.9, -2.3))
     assert door.axis == pytest.approx((0, 1, 0))
-    (tray,) = item(found, "cabinet").joints
-    # The cabinet is turned by a quarter: its +y is -x. The rail opens to its negative side.
+    (tray,) = item(parts_house, "cabinet").joints
+    # The cabinet is turned by a quarter: its +y is -x. The rail has a negative range.
     assert (tray.kind, tray.lower, tray.upper) == (JointKind.PRISMATIC, 0, 0.25)
     assert tray.axis == pytest.approx((1, 0, 0), abs=1e-6)
-    assert item(found, "mug").joints == ()
+    assert item(parts_house, "mug").joints == ()
 
 
-def test_the_first_keyframe_is_how_they_stand(tmp_path: Path) -> None:
+def test_the_first_keyframe_gives_the_pose(tmp_path: Path) -> None:
     quarter = np.pi / 2
     key = f'<keyframe><key qpos="{quarter} -.2 3 1 .85 1 0 0 0"/></keyframe>'
-    found = house(write_model(tmp_path, more=key))
-    # Turned anticlockwise about its right edge, the leaf stands out before the front.
+    posed_house = house(write_model(tmp_path, more=key))
+    # Turned anticlockwise about its right edge, the leaf is in front of the cabinet.
     opened = np.array([[1.3, 0, -2.3], [1.38, 1.8, -1.7]])
     shut = np.array([[0.7, 0, -2.3], [1.3, 1.8, -2.22]])
-    fridge = item(found, "fridge_1")
+    fridge = item(posed_house, "fridge_1")
     assert bounds(fridge, "fridge_1_door") == pytest.approx(opened, abs=1e-5)
     (door,) = fridge.joints
     assert door.value == pytest.approx(quarter)
@@ -79,7 +79,7 @@ def test_the_first_keyframe_is_how_they_stand(tmp_path: Path) -> None:
     points = np.concatenate([s.positions for s in fridge.surfaces if s.part])
     back = points @ motion[:3, :3].T + motion[:3, 3]
     assert [back.min(0).tolist(), back.max(0).tolist()] == pytest.approx(shut, abs=1e-5)
-    assert item(found, "cabinet").joints[0].value == pytest.approx(0.2)
+    assert item(posed_house, "cabinet").joints[0].value == pytest.approx(0.2)
 
 
 def test_a_joint_drawn_open_by_its_reference_is_open(tmp_path: Path) -> None:
@@ -121,24 +121,26 @@ def test_colliders_and_hidden_geoms_are_not_seen(tmp_path: Path) -> None:
         <geom type="box" size="1 1 1" rgba="0 1 0 0" contype="0" conaffinity="0"/>
         <geom type="box" size="1 1 1" group="3" contype="0" conaffinity="0"/>
       </body>"""
-    found = item(house(write_model(tmp_path, ROOM + table)), "table")
-    assert found.bounds == pytest.approx(np.array([[1.6, 0.38, -1.3], [2.4, 0.42, -0.7]]), abs=1e-6)
+    table_item = item(house(write_model(tmp_path, ROOM + table)), "table")
+    assert table_item.bounds == pytest.approx(
+        np.array([[1.6, 0.38, -1.3], [2.4, 0.42, -0.7]]), abs=1e-6
+    )
 
 
-def test_a_body_without_a_name_is_called_by_what_it_shows(tmp_path: Path) -> None:
+def test_a_body_without_a_name_is_named_by_its_contents(tmp_path: Path) -> None:
     chair = '<body><body name="obj_7"><geom name="chair_seat" type="box" pos="1 1 .4" size=".2 .2 .02"/></body></body>'
     assert item(house(write_model(tmp_path, ROOM + chair)), "chair_seat").nyu40 == 5
 
 
 @pytest.mark.parametrize("name", ["kitchen", "room_4"])
-def test_rooms_hold_their_floor_and_things(tmp_path: Path, name: str) -> None:
+def test_rooms_contain_their_floor_and_items(tmp_path: Path, name: str) -> None:
     walls = "".join(line for line in ROOM.splitlines(True) if "plane" not in line)
     room = f"""<body name="{name}"><geom name="slab_1" type="box" pos="2 1.5 -.005" size="2 1.5 .005"/>
       <body name="oven" pos="1 1 .4"><geom type="box" size=".3 .3 .4"/></body></body>"""
-    found = house(write_model(tmp_path, walls + room))
-    assert item(found, "slab_1").kind is ItemKind.FLOOR
-    assert len(found.rooms) == 1
-    assert item(found, "oven").n_faces == 12
+    rooms_house = house(write_model(tmp_path, walls + room))
+    assert item(rooms_house, "slab_1").kind is ItemKind.FLOOR
+    assert len(rooms_house.rooms) == 1
+    assert item(rooms_house, "oven").n_faces == 12
 
 
 def test_meshes_have_their_pictures_and_colours(tmp_path: Path) -> None:
@@ -156,9 +158,9 @@ def test_meshes_have_their_pictures_and_colours(tmp_path: Path) -> None:
     picture_body = (
         '<body name="picture" pos="1 1 1"><geom type="mesh" mesh="panel" material="paint"/></body>'
     )
-    found = house(write_model(tmp_path, ROOM + picture_body, assets))
-    (surface,) = item(found, "picture").surfaces
-    material = found.materials[surface.material]
+    picture_house = house(write_model(tmp_path, ROOM + picture_body, assets))
+    (surface,) = item(picture_house, "picture").surfaces
+    material = picture_house.materials[surface.material]
     assert material.texture_id is not None
     assert surface.uvs is not None
     # The panel's upper edge, at y = 1 in its own frame, shows the picture's upper edge: v = 1 upwards.
@@ -169,7 +171,7 @@ def test_meshes_have_their_pictures_and_colours(tmp_path: Path) -> None:
         {round(float(x), 6) for x in surface.uvs[lowest, 1]},
     )
     assert v == ({1.0}, {0.0})
-    red = found.materials[item(found, "wall_n").surfaces[0].material]
+    red = picture_house.materials[item(picture_house, "wall_n").surfaces[0].material]
     assert red.diffuse == pytest.approx((1, 0, 0), abs=1e-6)
 
 
@@ -196,14 +198,14 @@ def test_files_above_need_the_folder_of_both(tmp_path: Path) -> None:
     )
     with pytest.raises(BadHouse, match=r"sofa.xml.*leads out.*--models"):
         house(path)
-    found = read_house(resolve(str(path), models=str(tmp_path)), ReadFields())
-    assert item(found, "sofa").nyu40 == 6
+    read_home = read_house(resolve(str(path), models=str(tmp_path)), ReadFields())
+    assert item(read_home, "sofa").nyu40 == 6
 
 
 def test_shapes_that_are_not_read_are_a_note(tmp_path: Path) -> None:
     assets = '<asset><hfield name="h" nrow="2" ncol="2" size="1 1 1 .1"/></asset>'
-    found = house(write_model(tmp_path, ROOM + '<geom type="hfield" hfield="h"/>', assets))
-    assert [(n.kind, n.place) for n in found.notes] == [("unread-part", "height field")]
+    noted_house = house(write_model(tmp_path, ROOM + '<geom type="hfield" hfield="h"/>', assets))
+    assert [(n.kind, n.place) for n in noted_house.notes] == [("unread-part", "height field")]
 
 
 @pytest.mark.parametrize(
@@ -216,7 +218,7 @@ def test_shapes_that_are_not_read_are_a_note(tmp_path: Path) -> None:
         ("<mujoco><worldbody><geom type='box' size='nan 1 1'/></worldbody></mujoco>", "MuJoCo"),
     ],
 )
-def test_what_is_no_home_is_named(tmp_path: Path, text: str, what: str) -> None:
+def test_a_file_that_is_no_home_is_named(tmp_path: Path, text: str, what: str) -> None:
     path = tmp_path / "a.xml"
     path.write_text(text)
     with pytest.raises(BadHouse, match=what) as error:
@@ -227,12 +229,12 @@ def test_what_is_no_home_is_named(tmp_path: Path, text: str, what: str) -> None:
 def test_xml_of_other_kinds_stays_theirs(tmp_path: Path) -> None:
     path = tmp_path / "Home.xml"
     path.write_text("<?xml version='1.0'?><home version='7000'/>")
-    found = format_of_file(path)
-    assert found is not None
-    assert found.kind == "sweethome3d"
+    format_found = format_of_file(path)
+    assert format_found is not None
+    assert format_found.kind == "sweethome3d"
 
 
-def test_nothing_is_written_where_one_works(
+def test_no_file_is_written_to_the_working_folder(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     work = tmp_path / "work"

@@ -1,4 +1,4 @@
-"""Single models: found in folders and libraries, picked at random, read as a House of one item."""
+"""Single models: listed from folders and libraries, picked at random, read as a House of one item."""
 
 import zipfile
 from dataclasses import replace
@@ -42,7 +42,7 @@ height#2=1
 
 
 def shapenet(root: Path) -> Path:
-    """Two chairs and a table of ShapeNet's layouts, and a toaster in a folder of its own."""
+    """Two chairs and a table in ShapeNet's layouts, and a toaster in a separate folder."""
     for place in (
         "03001627/abc/models/model_normalized",
         "03001627/abd/model",
@@ -58,8 +58,8 @@ def shapenet(root: Path) -> Path:
 
 def test_shapenet_folders_give_their_class_and_model_id(tmp_path: Path) -> None:
     models = find_models([shapenet(tmp_path)])
-    seen = {(m.category, m.name, NYU40_NAMES[m.nyu40]) for m in models}
-    assert seen == {
+    chosen = {(m.category, m.name, NYU40_NAMES[m.nyu40]) for m in models}
+    assert chosen == {
         ("chair", "abc", "chair"),
         ("chair", "abd", "chair"),
         ("table", "abe", "table"),

@@ -1,4 +1,4 @@
-"""sceneState files: HSSD's, Rent3D++'s and generators', whole and damaged."""
+"""sceneState files of HSSD, Rent3D++ and generators, intact and damaged."""
 
 from __future__ import annotations
 
@@ -62,19 +62,19 @@ def test_a_hssd_scene_has_its_rooms_its_doors_with_leaves_and_windows_with_panes
     assert all(float(d.bounds[0, 1]) == pytest.approx(0, abs=0.01) for d in doors)
 
 
-def test_a_model_stands_where_its_matrix_says_turned_with_the_scene(tmp_path: Path) -> None:
+def test_the_matrix_of_a_model_places_it_and_the_scene_turns_it(tmp_path: Path) -> None:
     house = read(files.hssd_like(tmp_path))
     sofa = next(i for i in house.items if i.name == "couch")
     assert NYU40_NAMES[sofa.nyu40] == "sofa"
     low, high = sofa.bounds
-    # The plan's y runs away from the viewer: x stays, the front is turned by 180 degrees.
+    # The plan's y points away from the viewer: x is unchanged, the front is turned by 180 degrees.
     np.testing.assert_allclose(high - low, [2.0, 0.8, 0.9], atol=1e-5)
     assert low[1] == pytest.approx(0, abs=1e-5)
     room = house.room(sofa.room_id or "")
     assert room.name == "living room"
 
 
-def test_without_models_the_category_and_size_of_the_table_stand_in(tmp_path: Path) -> None:
+def test_without_models_the_tables_category_and_size_are_used(tmp_path: Path) -> None:
     house = read(files.hssd_like(tmp_path, with_models=False))
     box_only = [i for i in house.items if BOX_ONLY in i.tags]
     assert len(box_only) == 20
@@ -114,7 +114,7 @@ def test_a_generated_room_gets_its_ceiling_at_the_height_of_its_walls(tmp_path: 
     assert house.rooms[0].floor_y == pytest.approx(0)
 
 
-def test_a_wall_that_two_rooms_tell_is_one_and_so_is_its_door(tmp_path: Path) -> None:
+def test_a_wall_listed_by_two_rooms_is_one_and_so_is_its_door(tmp_path: Path) -> None:
     house = read(written(tmp_path, files.rent3d_like()))
     assert sum(i.kind is ItemKind.WALL for i in house.items) == 7
     assert sum(i.kind is ItemKind.DOOR for i in house.items) == 1
@@ -135,15 +135,15 @@ def test_a_hole_is_clipped_to_its_wall(tmp_path: Path) -> None:
     assert window.bounds[0, 0] >= -0.01
 
 
-# What is refused: one line with the place.
+# Refused inputs: one line with the place.
 
 
 def _changed(path: list[Any], value: Any) -> dict[str, Any]:
     scene = files.rent3d_like()
-    at: Any = scene["scene"]
+    target: Any = scene["scene"]
     for step in path[:-1]:
-        at = at[step]
-    at[path[-1]] = value
+        target = target[step]
+    target[path[-1]] = value
     return scene
 
 
@@ -162,16 +162,14 @@ FAULTS = {
 
 
 @pytest.mark.parametrize("name", FAULTS)
-def test_a_damaged_scene_is_refused_in_one_line_that_names_the_place(
-    tmp_path: Path, name: str
-) -> None:
+def test_a_damaged_scene_is_refused_with_its_place(tmp_path: Path, name: str) -> None:
     scene, expected = FAULTS[name]
     with pytest.raises(BadHouse, match=expected) as error:
         read(written(tmp_path, scene))
     assert "\n" not in str(error.value)
 
 
-def test_truncated_text_and_numbers_that_are_none_are_refused(tmp_path: Path) -> None:
+def test_truncated_text_and_invalid_numbers_are_refused(tmp_path: Path) -> None:
     path = written(tmp_path, files.rent3d_like())
     text = path.read_text()
     for damaged in (text[: len(text) * 2 // 3], text.replace("2.8", "NaN"), text.replace("2.8", "Infinity")):  # fmt: skip
@@ -198,9 +196,9 @@ def test_a_scene_in_centimetres_is_called_so_and_its_unit_mends_it(tmp_path: Pat
     scene["scene"]["unit"] = 0.01
     metres = tmp_path / "metres.scene.json"
     metres.write_text(text)
-    mended, known = read(written(tmp_path, scene)), read(metres)
-    assert [i.name for i in mended.items] == [i.name for i in known.items]
-    np.testing.assert_allclose(mended.items[0].bounds, known.items[0].bounds, atol=1e-4)
+    mended, expected = read(written(tmp_path, scene)), read(metres)
+    assert [i.name for i in mended.items] == [i.name for i in expected.items]
+    np.testing.assert_allclose(mended.items[0].bounds, expected.items[0].bounds, atol=1e-4)
 
 
 def test_ids_twice_cyclic_parents_and_names_that_lead_out_do_no_harm(tmp_path: Path) -> None:
@@ -229,7 +227,7 @@ def test_more_walls_slabs_or_holes_than_a_home_has_are_refused(tmp_path: Path, w
         read(written(tmp_path, scene))
 
 
-def test_a_million_elements_are_refused_at_once(tmp_path: Path) -> None:
+def test_a_million_elements_are_refused_quickly(tmp_path: Path) -> None:
     path = tmp_path / "many.scenestate.json"
     element = '{"type":"Wall","points":[[0,0,0],[1,0,0]],"height":1},'
     path.write_text(

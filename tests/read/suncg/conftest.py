@@ -1,4 +1,4 @@
-"""A small SUNCG root on disk and the house in it, each made once a module."""
+"""A small SUNCG root on disk and its house, built once per module."""
 
 from pathlib import Path
 

@@ -1,4 +1,4 @@
-"""OBJ and MTL text in SUNCG's manner, for synthetic roots; no effects."""
+"""OBJ and MTL text in SUNCG's style, for synthetic roots; no effects."""
 
 from __future__ import annotations
 
@@ -105,7 +105,7 @@ def slab_with_holes(
     face: str,
     edge: str,
 ) -> None:
-    """One slab of a wall between two distances outward, cut by rectangular holes, closed."""
+    """One closed slab of a wall between two distances outward, cut by rectangular holes."""
     ss = sorted({0.0, length, *(x for h in holes for x in h[:2])})
     ys = sorted({0.0, height, *(min(max(y, 0.0), height) for h in holes for y in h[2:])})
 
@@ -140,7 +140,7 @@ def slab_with_holes(
                 edges.append([at(a, c, far), at(b, c, far), at(b, c, near), at(a, c, near)])
             if not is_solid(i, j + 1):
                 edges.append([at(a, d, near), at(b, d, near), at(b, d, far), at(a, d, far)])
-    # The winding above fronts the room when along x up points away from it.
+    # With the winding above, the face looks into the room if along x up points away from it.
     turn = along[1] * outward[0] - along[0] * outward[1] > 0
     obj.begin(group=group, material=face)
     for corners in faces:

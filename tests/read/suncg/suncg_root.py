@@ -1,6 +1,6 @@
 """Builds small SUNCG roots in code: our own models, tables and textures. Effect: writes files.
 
-`write_root` has every feature once; `write_large_root` has as many nodes as asked.
+`write_root` has every feature once; `write_large_root` has a given number of nodes.
 """
 
 from __future__ import annotations
@@ -41,34 +41,34 @@ def house_json() -> dict[str, Any]:
     nodes = [
         room("0_0", "fr_0rm_0", [2, 3, 4, 5, 6, 9, 10, 11, 15, 16], ["Bedroom"]),
         room("0_1", "fr_0rm_1", [7, 8, 0], []) | {"hideCeiling": 1},
-        thing("0_2", "chair", at(1, 0.05, 1)),
-        thing("0_3", "chair", at(2, 0.05, 1, mirror=True), isMirrored=1),
-        thing("0_4", "lamp", at(0.5, 0.05, 2.5)),
-        thing("0_5", "bare_lamp", at(3.5, 0.05, 2.5)),
-        thing("0_6", "window", at(2.2, 0.9, 3.05)),
-        thing("0_7", "door", at(4.05, 0.05, 1.5, turn=1), state=1),
-        thing("0_8", "door", at(6.0, 0.05, 1.5), state="0"),
-        thing("0_9", "plant", at(3.5, 0.05, 0.5)),
-        thing("0_10", "nobody_has_this", at(3, 0.05, 0.5)),
+        object_node("0_2", "chair", placement(1, 0.05, 1)),
+        object_node("0_3", "chair", placement(2, 0.05, 1, mirror=True), isMirrored=1),
+        object_node("0_4", "lamp", placement(0.5, 0.05, 2.5)),
+        object_node("0_5", "bare_lamp", placement(3.5, 0.05, 2.5)),
+        object_node("0_6", "window", placement(2.2, 0.9, 3.05)),
+        object_node("0_7", "door", placement(4.05, 0.05, 1.5, turn=1), state=1),
+        object_node("0_8", "door", placement(6.0, 0.05, 1.5), state="0"),
+        object_node("0_9", "plant", placement(3.5, 0.05, 0.5)),
+        object_node("0_10", "nobody_has_this", placement(3, 0.05, 0.5)),
         {
-            "id": "0_11", "type": "Box", "valid": 1, "transform": at(2, 0.3, 2),
+            "id": "0_11", "type": "Box", "valid": 1, "transform": placement(2, 0.3, 2),
             "dimensions": [0.4, 0.5, 0.6],
             "materials": [{"name": f"side{k}", "diffuse": f"#0{k}0000"} for k in range(5)],
         },
         {"id": "0_12", "type": "Ground", "valid": 1, "modelId": "fr_0gd_12"},
-        thing("0_13", "chair", at(1, 0.05, 2)) | {"valid": 0},
+        object_node("0_13", "chair", placement(1, 0.05, 2)) | {"valid": 0},
         {"id": "0_14", "type": "None"},
-        thing("0_15", "chair", at(3, 0.05, 2, scale=1.5), materials=[
+        object_node("0_15", "chair", placement(3, 0.05, 2, scale=1.5), materials=[
             {"name": "stone", "texture": "stone"},
             {"name": "colour", "diffuse": "#ff8000"},
             {"name": "extra", "diffuse": "#000000"},
         ]),
-        thing("0_16", "chair", at(1, 0.05, 2, turn=1), materials=[
+        object_node("0_16", "chair", placement(1, 0.05, 2, turn=1), materials=[
             {"name": "both", "texture": "leaves", "diffuse": "#808080"},
             {"name": "same"},
         ]),
     ]  # fmt: skip
-    upstairs = [thing("1_0", "person", at(1, 2.8, 1))]
+    upstairs = [object_node("1_0", "person", placement(1, 2.8, 1))]
     return {
         "version": "suncg@1.0.0", "id": HOUSE, "up": [0, 1, 0], "front": [0, 0, 1],
         "scaleToMeters": 1, "bbox": {"min": [0, 0, 0], "max": [7, 5, 3]},
@@ -84,17 +84,17 @@ def room(node_id: str, model_id: str, members: list[int], types: list[str]) -> d
     }  # fmt: skip
 
 
-def thing(node_id: str, model_id: str, transform: list[float], **more: Any) -> dict[str, Any]:
+def object_node(node_id: str, model_id: str, transform: list[float], **more: Any) -> dict[str, Any]:
     """An Object node."""
     return {
         "id": node_id, "type": "Object", "valid": 1, "modelId": model_id, "transform": transform,
     } | more  # fmt: skip
 
 
-def at(
+def placement(
     x: float, y: float, z: float, *, turn: int = 0, mirror: bool = False, scale: float = 1.0
 ) -> list[float]:
-    """A column-major transform: quarter turns about y, then a place."""
+    """A column-major transform: quarter turns about y, then a translation."""
     c, s = [(1, 0), (0, 1), (-1, 0), (0, -1)][turn % 4]
     m = np.eye(4)
     m[:3, :3] = np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]]) @ np.diag(
@@ -106,7 +106,7 @@ def at(
 
 
 def write(path: Path, content: str | bytes) -> None:
-    """Write a file, its folders too."""
+    """Write a file and its parent folders."""
     path.parent.mkdir(parents=True, exist_ok=True)
     path.write_bytes(content.encode() if isinstance(content, str) else content)
 
@@ -246,7 +246,7 @@ def write_room(
         write(folder / f"{model_id}{part}.mtl", mtl(look))
     obj = Obj(f"{model_id}w.mtl")
     corners = [(x0, 0.0), (x0, 3.0), (x1, 3.0), (x1, 0.0)]
-    # Walls in order: x0, z3 (from x0 to x1), x1 (back), z0; start, along, outward, length.
+    # Walls in order: x0, z3 (from x0 to x1), x1 (back), z0. Columns: start, along, outward, length.
     sides = [
         (0, corners[0], (0.0, 1.0), (-1.0, 0.0), 3.0),
         (2, corners[1], (1.0, 0.0), (0.0, 1.0), x1 - x0),
@@ -288,7 +288,7 @@ def write_large_root(
 ) -> str:
     """One long room with n_nodes objects of n_models models of 2 detail^2 triangles; its id.
 
-    1,400 faces a model is the mean of the 29 real models that were looked at (docs/spec/suncg.md section 1.5).
+    1,400 faces per model is the mean of 29 real models (docs/spec/suncg.md section 1.5).
     """
     _write_textures(root)
     _write_models(root)
@@ -312,10 +312,14 @@ def write_large_root(
     ]
     for k in range(1, n_nodes - 4):
         x, z = places[k]
-        nodes.append(thing(f"0_{k}", f"m{k % n_models}", at(x, 0.05, z, turn=k, mirror=k % 7 == 0)))
+        nodes.append(
+            object_node(
+                f"0_{k}", f"m{k % n_models}", placement(x, 0.05, z, turn=k, mirror=k % 7 == 0)
+            )
+        )
     for k, (model, x) in enumerate((("window", 2.2), ("lamp", 3), ("lamp", 6), ("lamp", 9))):
         y, z = (0.9, 3.05) if model == "window" else (0.05, 1.5)
-        nodes.append(thing(f"0_{n_nodes - 4 + k}", model, at(x, y, z)))
+        nodes.append(object_node(f"0_{n_nodes - 4 + k}", model, placement(x, y, z)))
     plain = house_json() | {"levels": [{"id": "0", "nodes": nodes}]}
     write(root / f"house/{HOUSE}/house.json", json.dumps(plain))
     return HOUSE
@@ -327,12 +331,12 @@ def item(house: House, item_id: str) -> Item:
 
 
 def material_of(house: House, item_id: str, surface: str) -> Material:
-    """The material of an item's surface, by their names."""
-    found = next(s for s in item(house, item_id).surfaces if s.name == surface)
-    return house.materials[found.material]
+    """The material of a named surface of an item."""
+    match = next(s for s in item(house, item_id).surfaces if s.name == surface)
+    return house.materials[match.material]
 
 
 def outward_volume(surfaces: tuple[Surface, ...]) -> float:
-    """Signed volume by the divergence theorem: positive when closed faces look outwards."""
+    """Signed volume by the divergence theorem: positive if closed faces look outwards."""
     p = np.concatenate([s.positions[s.faces] for s in surfaces]).astype(np.float64)
     return float(np.einsum("ij,ij->i", p[:, 0], np.cross(p[:, 1], p[:, 2])).sum() / 6)

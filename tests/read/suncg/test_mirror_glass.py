@@ -1,4 +1,4 @@
-"""The glass of a SUNCG mirror is a mirror, its frame is not."""
+"""The glass of a SUNCG mirror reflects, its frame does not."""
 
 from __future__ import annotations
 

@@ -46,7 +46,7 @@ def test_v2_walls_are_solids_outward_from_their_points(tmp_path: Path) -> None:
     assert np.allclose(item(house, "0_0w0").bounds[0], [0, 0, -0.12], atol=1e-5)
 
 
-def test_walls_drawn_the_other_way_round_stand_in_the_same_place(tmp_path: Path) -> None:
+def test_walls_drawn_in_reverse_are_in_the_same_place(tmp_path: Path) -> None:
     arch = arch_json()
     for element in arch["elements"][:4]:
         element["points"].reverse()
@@ -81,7 +81,7 @@ def test_a_slab_with_a_hole_is_closed(tmp_path: Path) -> None:
     assert volume(item(read(tmp_path), "0_0f").surfaces) == pytest.approx(11 * 0.05, rel=1e-5)
 
 
-def test_holes_become_openings_with_the_window_that_stands_in_them(tmp_path: Path) -> None:
+def test_holes_become_openings_with_their_windows(tmp_path: Path) -> None:
     write_v2(tmp_path, arch_json())
     (opening,) = read(tmp_path).openings
     assert (opening.item_id, opening.is_window, opening.is_cut) == ("0_6", True, False)
@@ -124,7 +124,7 @@ def test_a_wrong_arch_json_is_refused_naming_the_element(
     assert caught.value.file.endswith("arch.json")
 
 
-def test_a_v2_root_without_arch_json_says_what_is_missing(tmp_path: Path) -> None:
+def test_a_v2_root_without_arch_json_is_refused_with_the_missing_file(tmp_path: Path) -> None:
     write_v2(tmp_path, arch_json())
     shutil.rmtree(tmp_path / "wall")
     with pytest.raises(BadHouse, match=r"room\.zip.*arch\.json"):

@@ -64,9 +64,9 @@ def node(k: int, **more: Any) -> Callable[[dict[str, Any]], None]:
         (node(2, transform=[1] * 16), "level 0 node 2 (Object 0_2), transform"),
         (node(2, transform=[0] * 15 + [1]), "level 0 node 2 (Object 0_2), transform"),
         (node(2, transform=["x"] * 16), "level 0 node 2 (Object 0_2), transform[0]"),
-        (node(2, transform=[*suncg_root.at(1, 0, 1)[:12], 10**30, 0, 0, 1]),
+        (node(2, transform=[*suncg_root.placement(1, 0, 1)[:12], 10**30, 0, 0, 1]),
          "level 0 node 2 (Object 0_2), transform[12]"),
-        (node(2, transform=suncg_root.at(10_000, 0, 1)), "level 0 node 2 (Object 0_2)"),
+        (node(2, transform=suncg_root.placement(10_000, 0, 1)), "level 0 node 2 (Object 0_2)"),
         (node(2, modelId="../../etc/passwd"), "level 0 node 2 (Object 0_2), modelId"),
         (node(2, modelId=".."), "level 0 node 2 (Object 0_2), modelId"),
         (node(2, modelId=None), "level 0 node 2 (Object 0_2), modelId"),
@@ -125,9 +125,7 @@ def test_house_json_cut_anywhere_is_refused(root: Path) -> None:
 @pytest.mark.parametrize(
     "row", ["lamp 3 1", "lamp 1 bulb 0", "lamp 0 2 material_1", "lamp 1 -1 0", "lamp"]
 )
-def test_a_row_of_the_lamps_that_nobody_understands_costs_one_lamp_and_no_house(
-    root: Path, row: str
-) -> None:
+def test_an_unreadable_row_of_lamps_costs_only_that_lamp(root: Path, row: str) -> None:
     (root / "metadata/light_geometry_compact.txt").write_text(f"other 1 material_0 0\n{row}\n")
     (note,) = [n for n in read(root).notes if n.kind == "unreadable-row"]
     assert "light_geometry_compact.txt: line 2" in str(note)
@@ -153,7 +151,7 @@ def test_a_wrong_model_is_left_out_and_a_wrong_table_refused_naming_the_file(
 ) -> None:
     (root / name).write_text(text)
     if name.endswith(".obj"):
-        # A library is shared: a damaged model is left out with a note that names its file.
+        # A library is shared: a damaged model is skipped with a note that names its file.
         notes = [n.text for n in read(root).notes if n.kind == "unreadable-model"]
         assert any(name in text and re.search(message, text) for text in notes)
         return
@@ -208,13 +206,13 @@ def test_links_inside_the_root_are_followed(root: Path) -> None:
     assert not any("wood" in n.text for n in read(root).notes)
 
 
-def test_a_root_without_rooms_says_which_archive_is_missing(root: Path) -> None:
+def test_a_root_without_rooms_names_the_missing_archive(root: Path) -> None:
     shutil.rmtree(root / "room")
     with pytest.raises(BadHouse, match=r"room/ does not exist.*room\.zip"):
         read(root)
 
 
-def test_a_house_without_its_rooms_says_so(root: Path) -> None:
+def test_a_house_without_its_rooms_is_refused(root: Path) -> None:
     shutil.rmtree(root / f"room/{HOUSE}")
     (root / "room/other").mkdir()
     with pytest.raises(BadHouse, match=f"room/{HOUSE} does not exist"):
@@ -235,7 +233,7 @@ def test_ids_that_are_no_names_are_refused(root: Path, house_id: str) -> None:
         read_suncg(root, house_id, ReadFields())
 
 
-def test_a_house_outside_a_root_and_a_json_alone_are_told_what_a_root_looks_like(
+def test_a_house_outside_a_root_is_refused_with_the_layout_of_a_root(
     root: Path, tmp_path: Path
 ) -> None:
     alone = tmp_path / "homes" / HOUSE
@@ -314,10 +312,10 @@ def test_whatever_the_bytes_the_outcome_is_a_house_or_a_bad_house(
 ) -> None:
     with tempfile.TemporaryDirectory() as folder:
         root = Path(shutil.copytree(pristine, Path(folder) / "root"))
-        for name, at, new, n_gone in changes:
+        for name, start, new, n_gone in changes:
             data = (root / name).read_bytes()
-            at %= len(data) + 1
-            (root / name).write_bytes(data[:at] + new + data[at + n_gone :])
+            start %= len(data) + 1
+            (root / name).write_bytes(data[:start] + new + data[start + n_gone :])
         outcome(lambda: read(root))
 
 

@@ -44,7 +44,7 @@ def test_the_house_survives_the_bundle(house: House) -> None:
     assert bundle_from_house(house_from_bundle(*bundle)) == bundle
 
 
-def test_missing_things_are_notes_and_the_rest_goes_on(house: House) -> None:
+def test_missing_files_are_notes_and_the_rest_is_read(house: House) -> None:
     notes = {(n.kind, n.text.split()[0].rstrip(":")) for n in house.notes}
     assert notes == {
         ("missing-texture", "texture/gone.jpg"),
@@ -66,12 +66,14 @@ def test_scale_and_axes_of_the_house_are_applied_to_rooms_too(tmp_path: Path, ho
     plain = suncg_root.house_json() | {"up": [0, 0, 1], "front": [1, 0, 0], "scaleToMeters": 0.5}
     (tmp_path / f"house/{HOUSE}/house.json").write_text(json.dumps(plain))
     turned = read_suncg(tmp_path, HOUSE, ReadFields())
-    for one, other in zip(house.items[:6], turned.items[:6], strict=True):
-        expected = 0.5 * one.bounds[:, [1, 2, 0]]  # x = up x front = y, y = up = z, z = front = x
-        assert np.allclose(other.bounds, expected, atol=1e-5)
+    for original, turned_item in zip(house.items[:6], turned.items[:6], strict=True):
+        expected = (
+            0.5 * original.bounds[:, [1, 2, 0]]
+        )  # x = up x front = y, y = up = z, z = front = x
+        assert np.allclose(turned_item.bounds, expected, atol=1e-5)
 
 
-def test_without_tables_everything_is_otherprop_and_said_so(tmp_path: Path) -> None:
+def test_without_tables_everything_is_otherprop_with_a_note(tmp_path: Path) -> None:
     suncg_root.write_root(tmp_path)
     for table in (tmp_path / "metadata").iterdir():
         table.unlink()

@@ -14,7 +14,7 @@ from tests.read.suncg import suncg_root
 from tests.read.suncg.suncg_root import HOUSE, item, material_of
 
 
-def test_lamps_have_lights_in_the_world_each_with_its_own_bulb(house: House) -> None:
+def test_lamps_have_lights_in_the_world_with_one_bulb_each(house: House) -> None:
     lamp = item(house, "0_4")
     point, spot = lamp.lights
     assert np.allclose(point.position, [0.3, 1.6, 2.5])
@@ -57,7 +57,7 @@ def test_rows_of_the_lamp_table_name_materials_or_count_them(tmp_path: Path, row
 def test_lights_turn_with_their_mirrored_lamp(tmp_path: Path) -> None:
     suncg_root.write_root(tmp_path)
     plain = suncg_root.house_json()
-    plain["levels"][0]["nodes"][4]["transform"] = suncg_root.at(1, 0, 1, turn=1, mirror=True)
+    plain["levels"][0]["nodes"][4]["transform"] = suncg_root.placement(1, 0, 1, turn=1, mirror=True)
     (tmp_path / f"house/{HOUSE}/house.json").write_text(json.dumps(plain))
     point, spot = item(read_suncg(tmp_path, HOUSE, ReadFields()), "0_4").lights
     # (-0.2, 1.55, 0) mirrored in x, then a quarter turn: x goes to -z.

@@ -35,7 +35,7 @@ def test_labels_and_kinds_come_from_the_users_table(house: House) -> None:
     assert got["0_11"][:2] == (ItemKind.OBJECT, 0)
 
 
-def test_without_active_column_persons_and_plants_are_still_known(tmp_path: Path) -> None:
+def test_without_active_column_persons_and_plants_are_still_recognised(tmp_path: Path) -> None:
     suncg_root.write_root(tmp_path)
     table = tmp_path / "metadata/ModelCategoryMappingNewActive.csv"
     lines = [line.rsplit(",", 1)[0] for line in table.read_text().splitlines()]
@@ -53,7 +53,7 @@ def test_a_model_that_is_not_active_is_removed_as_a_plant(tmp_path: Path) -> Non
     assert item(read_suncg(tmp_path, HOUSE, ReadFields()), "0_2").kind is ItemKind.PLANT
 
 
-def test_objects_stand_where_their_column_major_transform_puts_them(house: House) -> None:
+def test_column_major_transforms_place_objects(house: House) -> None:
     assert np.allclose(item(house, "0_2").bounds, [[0.8, 0.05, 0.8], [1.2, 1.05, 1.2]])
     assert np.allclose(item(house, "0_15").bounds, [[2.7, 0.05, 1.7], [3.3, 1.55, 2.3]])
     # A quarter turn about +y takes the chair's back from -z to -x.
@@ -108,7 +108,9 @@ def test_a_wrong_isMirrored_is_noted_and_the_transform_believed(tmp_path: Path) 
 
 def test_state_one_takes_the_variant_mesh(house: House) -> None:
     closed, opened = item(house, "0_7"), item(house, "0_8")
-    assert np.ptp(closed.bounds, axis=0)[0] == pytest.approx(0.1, abs=1e-5)  # turned to the wall
+    assert np.ptp(closed.bounds, axis=0)[0] == pytest.approx(
+        0.1, abs=1e-5
+    )  # turned towards the wall
     assert np.ptp(opened.bounds, axis=0)[2] == pytest.approx(0.95, abs=1e-5)
 
 
@@ -117,12 +119,15 @@ def test_materials_are_overridden_by_position(house: House) -> None:
         material_of(house, "0_15", "material_0"),
         material_of(house, "0_15", "material_1"),
     )
-    assert texture_name(house, stone) == "stone.png"  # PNG before JPEG
+    assert texture_name(house, stone) == "stone.png"  # PNG is preferred to JPEG
     assert stone.diffuse == (1.0, 1.0, 1.0)
     assert orange.diffuse == (1.0, 128 / 255, 0.0)
     assert orange.texture_id is None
-    both, same = material_of(house, "0_16", "material_0"), material_of(house, "0_16", "material_1")
-    assert (texture_name(house, both), both.diffuse) == ("leaves.png", (128 / 255,) * 3)
+    overridden, same = (
+        material_of(house, "0_16", "material_0"),
+        material_of(house, "0_16", "material_1"),
+    )
+    assert (texture_name(house, overridden), overridden.diffuse) == ("leaves.png", (128 / 255,) * 3)
     assert same.diffuse == (0.1, 0.2, 0.9)
     model = material_of(house, "0_2", "material_0")
     assert (texture_name(house, model), model.diffuse) == ("wood.jpg", (0.64, 0.64, 0.64))
@@ -144,15 +149,15 @@ def test_a_picture_of_opacity_is_the_alpha_of_the_colours(tmp_path: Path) -> Non
     mtl = tmp_path / "object/chair/chair.mtl"
     before = read_suncg(tmp_path, HOUSE, ReadFields())
     names = [line.split()[1] for line in mtl.read_text().splitlines() if "map_Kd" in line]
-    given = names[0].replace(Path(names[0]).name, "mask.png")
-    mtl.write_text(mtl.read_text().replace("map_Kd", f"map_d {given}\nmap_Kd", 1))
+    picture_name = names[0].replace(Path(names[0]).name, "mask.png")
+    mtl.write_text(mtl.read_text().replace("map_Kd", f"map_d {picture_name}\nmap_Kd", 1))
     holed = material_of(house := read_suncg(tmp_path, HOUSE, ReadFields()), "0_2", "material_0")
     assert holed.alpha_cutout
     assert not material_of(before, "0_2", "material_0").alpha_cutout
     alpha = Image.open(io.BytesIO(house.textures[holed.texture_id or ""].data)).getchannel("A")
     assert alpha.getextrema() == (0, 255)
     assert alpha.getpixel((0, 0)) == 0
-    # Without the picture the colour stays.
+    # The colour remains if the picture is missing.
     (tmp_path / "texture/mask.png").unlink()
     house = read_suncg(tmp_path, HOUSE, ReadFields())
     plain = material_of(house, "0_2", "material_0")
@@ -169,5 +174,5 @@ def test_glass_of_windows_is_a_pane_and_other_glass_is_glass(house: House, tmp_p
     suncg_root.write_root(tmp_path)
     mtl = tmp_path / "object/chair/chair.mtl"
     mtl.write_text(mtl.read_text().replace("Ns 0\nd 1", "Ns 0\nd 0.5"))
-    other = read_suncg(tmp_path, HOUSE, ReadFields())
-    assert material_of(other, "0_2", "material_1").kind is MaterialKind.GLASS
+    material = read_suncg(tmp_path, HOUSE, ReadFields())
+    assert material_of(material, "0_2", "material_1").kind is MaterialKind.GLASS

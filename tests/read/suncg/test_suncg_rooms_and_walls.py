@@ -57,7 +57,7 @@ def test_wall_texture_area_is_surface_area_in_metres(house: House) -> None:
         assert np.abs(a[0] * b[1] - a[1] * b[0]).sum() == pytest.approx(area, rel=1e-4)
 
 
-def test_walls_with_a_default_paper_are_white_whatever_their_colour(house: House) -> None:
+def test_walls_with_a_default_paper_are_white_despite_their_colour(house: House) -> None:
     inside = material_of(house, "0_0w2", "WallInside#0_0_2 in")
     outside = material_of(house, "0_0w2", "WallOutside#0_0_2 out")
     edge = material_of(house, "0_0w2", "WallInside#0_0_2 edge")
@@ -70,7 +70,7 @@ def test_walls_with_a_default_paper_are_white_whatever_their_colour(house: House
 
 def test_openings_are_the_holes_of_the_walls(house: House) -> None:
     by_item = {o.item_id: o for o in house.openings}
-    assert set(by_item) == {"0_6", "0_7"}  # the second door stands in no wall
+    assert set(by_item) == {"0_6", "0_7"}  # the second door is in no wall
     window, door = by_item["0_6"], by_item["0_7"]
     assert window.is_window
     assert not door.is_window

@@ -17,7 +17,7 @@ g wedge
 usemtl redwood
 f 1 3 2\nf 4 5 6\nf 1 2 5 4\nf 1 4 6 3\nf 2 3 6 5
 """
-"""A wedge 4 wide, 1 high, 2 deep: high at the left, a thin edge at the right."""
+"""A wedge 4 wide, 1 high, 2 deep: high at the left, with a thin edge at the right."""
 
 WINDOW_OBJ = b"""
 v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nv 0 0 .1\nv 1 0 .1\nv 1 1 .1\nv 0 1 .1
@@ -58,7 +58,7 @@ def sh3d(xml: bytes, contents: dict[str, bytes] | None = None) -> bytes:
 
 def piece(attributes: str, inner: str = "", tag: str = "pieceOfFurniture") -> str:
     """A piece 200 x 100 x 50 cm at (150, 100) unless attributes say otherwise."""
-    given = {
+    attribute_values = {
         "name": "Thing",
         "model": "1",
         "x": "150",
@@ -67,5 +67,7 @@ def piece(attributes: str, inner: str = "", tag: str = "pieceOfFurniture") -> st
         "depth": "100",
         "height": "50",
     }
-    rest = "".join(f" {k}='{v}'" for k, v in given.items() if f" {k}=" not in f" {attributes}")
+    rest = "".join(
+        f" {k}='{v}'" for k, v in attribute_values.items() if f" {k}=" not in f" {attributes}"
+    )
     return f"<{tag} {attributes}{rest}>{inner}</{tag}>"

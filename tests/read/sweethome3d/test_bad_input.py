@@ -1,4 +1,4 @@
-"""Whatever the bytes, a reader gives a House or a BadHouse that names the place."""
+"""For any bytes a reader returns a House or raises a BadHouse that names the place."""
 
 from __future__ import annotations
 
@@ -49,14 +49,14 @@ def refused(data: bytes, match: str, fields: ReadFields | None = None) -> None:
     assert str(caught.value).startswith("my home.sh3d")
 
 
-def test_a_home_whose_levels_are_all_hidden_is_told_how_to_read_them() -> None:
+def test_a_home_with_only_hidden_levels_explains_how_to_read_them() -> None:
     level = "<level id='0' elevation='0' floorThickness='12' height='250' viewable='false'/>"
     room = ROOM.replace("<room ", "<room level='0' ")
     refused(sh3d(home_xml(level, room=room)), "read.hidden_levels")
 
 
 @pytest.mark.parametrize("data", [b"", b"hello", b"\x00" * 100, b"%PDF-1.4"])
-def test_what_is_no_home_is_refused(data: bytes) -> None:
+def test_a_file_that_is_no_home_is_refused(data: bytes) -> None:
     refused(data, "neither a .sh3d archive")
 
 
@@ -68,12 +68,12 @@ def test_a_truncated_zip_is_refused() -> None:
 
 def test_a_damaged_entry_is_refused_by_name() -> None:
     whole = bytearray(sh3d(home_xml(FULL)))
-    at = whole.find(b"Home.xml") + 40
-    whole[at : at + 40] = b"\xaa" * 40
+    start = whole.find(b"Home.xml") + 40
+    whole[start : start + 40] = b"\xaa" * 40
     refused(bytes(whole), "Home.xml")
 
 
-def test_a_home_without_home_xml_says_how_to_save_it_again() -> None:
+def test_a_home_without_home_xml_explains_how_to_save_it_again() -> None:
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w") as archive:
         archive.writestr("Home", b"\xac\xed")
@@ -91,18 +91,18 @@ def test_a_zip_bomb_is_refused_without_unpacking_it() -> None:
         archive.writestr("Home.xml", home_xml(FULL))
         archive.writestr("bomb", b"x")
     data = stream.getvalue()
-    at = data.rfind(b"PK\x01\x02")
-    # The directory claims 3 GB.
-    refused(data[: at + 24] + struct.pack("<I", 3 * 2**30) + data[at + 28 :], "unpacks to")
+    start = data.rfind(b"PK\x01\x02")
+    # The zip directory claims 3 GB.
+    refused(data[: start + 24] + struct.pack("<I", 3 * 2**30) + data[start + 28 :], "unpacks to")
 
 
-def test_an_entry_that_unpacks_to_more_than_it_says_is_refused() -> None:
+def test_an_entry_larger_than_declared_is_refused() -> None:
     xml = home_xml(FULL)
     data = bytearray(sh3d(xml))
     small = struct.pack("<I", 100)
-    at = data.rfind(b"PK\x01\x02")
-    data[at + 24 : at + 28] = small
-    data[at + 16 : at + 20] = struct.pack("<I", zlib.crc32(xml[:100]))
+    start = data.rfind(b"PK\x01\x02")
+    data[start + 24 : start + 28] = small
+    data[start + 16 : start + 20] = struct.pack("<I", zlib.crc32(xml[:100]))
     refused(bytes(data), "Home.xml")
 
 
@@ -166,7 +166,7 @@ def test_a_missing_or_foreign_model_is_noted_and_the_rest_is_read() -> None:
     assert any("Scan" in n.place and "Collada" in n.text for n in house.notes)
 
 
-def test_a_home_none_of_whose_models_can_be_found_is_refused() -> None:
+def test_a_home_without_any_of_its_models_is_refused() -> None:
     refused(home_xml(piece("")), "none of its 1 models")
 
 

@@ -1,4 +1,4 @@
-"""The nine example homes, where they were fetched; and how they are fetched."""
+"""The nine example homes, if they were fetched; and how they are fetched."""
 
 from __future__ import annotations
 
@@ -50,8 +50,8 @@ def test_an_example_home_is_read_whole(name: str) -> None:
 
 
 @pytest.mark.homes
-def test_what_a_home_hides_of_a_piece_names_it_no_more() -> None:
-    # Studio hides the television of its TV unit and sets a flat one on the bench.
+def test_hidden_parts_no_longer_name_a_piece() -> None:
+    # Studio hides the television of its TV unit and places a flat one on the bench.
     classes = {i.name: NYU40_NAMES[i.nyu40] for i in example("Studio").items}
     assert (classes["TV unit"], classes["Flat TV"]) == ("cabinet", "television")
 
@@ -72,18 +72,18 @@ def test_the_walls_and_cutters_of_a_real_home_are_closed_solids(name: str) -> No
 
 
 @pytest.mark.homes
-def test_the_authors_cameras_stand_in_rooms_and_look_at_something() -> None:
+def test_the_authors_cameras_are_in_rooms_and_see_something() -> None:
     house = example("2BedroomApartment")
     assert len(house.cameras) == 6
     for camera in house.cameras:
-        at = shapely.Point(camera.eye[[0, 2]])
-        assert any(shapely.Polygon(r.polygon).contains(at) for r in house.rooms)
+        standpoint = shapely.Point(camera.eye[[0, 2]])
+        assert any(shapely.Polygon(r.polygon).contains(standpoint) for r in house.rooms)
         assert 0.9 < camera.eye[1] < 2.4
         assert np.linalg.norm(camera.towards) == pytest.approx(1.0)
 
 
 def deb(folder: Path, version: str = homes_package.TESTED_VERSION) -> Path:
-    """A package of that version with a jar that holds one home."""
+    """A package of that version with a jar of one home."""
     jar = io.BytesIO()
     with zipfile.ZipFile(jar, "w") as archive:
         archive.writestr(f"{homes_package.EXAMPLES}/Studio.xml", "<home/>")
@@ -133,7 +133,7 @@ def test_an_unknown_home_is_refused_with_the_names(tmp_path: Path) -> None:
         homes_package.fetch(tmp_path).home("Castle")
 
 
-def test_a_damaged_package_says_to_fetch_it_again(tmp_path: Path) -> None:
+def test_a_damaged_package_advises_to_fetch_it_again(tmp_path: Path) -> None:
     path = deb(tmp_path)
     path.write_bytes(path.read_bytes()[:200])
     with pytest.raises(MachineFailed, match="fetch it again"):

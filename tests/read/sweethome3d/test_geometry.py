@@ -1,4 +1,4 @@
-"""Sweet Home 3D geometry: every thing stands where the format says."""
+"""Sweet Home 3D geometry: every item is placed as the format specifies."""
 
 from __future__ import annotations
 
@@ -74,12 +74,12 @@ def test_joined_walls_share_their_corner_bit_for_bit() -> None:
         assert end == start
 
 
-def test_left_is_left_for_who_walks_along_the_wall() -> None:
+def test_left_is_the_left_side_along_the_wall() -> None:
     wall = item(read(WALLS.replace("id='a'", "id='a' leftSideColor='FFFF0000'")), "wall_a")
-    left = wall.surfaces[0]
+    left_surface = wall.surfaces[0]
     # From (0, 0) to (4, 0) with y down: left is up on the plan, so z < 0.
-    assert left.name == "left"
-    assert left.positions[:, 2].max() < 0
+    assert left_surface.name == "left"
+    assert left_surface.positions[:, 2].max() < 0
 
 
 def test_a_mitre_stops_at_twice_the_thickness() -> None:
@@ -144,7 +144,7 @@ def test_a_wall_upstairs_reaches_down_through_its_floor() -> None:
     assert high == pytest.approx(5.12, abs=1e-5)
 
 
-def test_hidden_levels_are_left_out_unless_asked_for() -> None:
+def test_hidden_levels_are_left_out_unless_requested() -> None:
     body = (
         "<level id='0' elevation='0' floorThickness='12' height='250'/>"
         "<level id='1' elevation='262' floorThickness='12' height='250' visible='false'/>"
@@ -186,7 +186,7 @@ def test_a_room_polygon_runs_counter_clockwise() -> None:
     assert shapely.LinearRing(polygon).is_ccw
 
 
-def test_later_rooms_win_where_two_overlap() -> None:
+def test_later_rooms_win_in_overlaps() -> None:
     second = "<room name='Bath'><point x='205' y='5'/><point x='395' y='5'/><point x='395' y='295'/><point x='205' y='295'/></room>"
     house = read("", room=ROOM + second)
     areas = [solid(i.surfaces).area for i in house.items if i.kind is ItemKind.FLOOR]
@@ -194,7 +194,7 @@ def test_later_rooms_win_where_two_overlap() -> None:
     assert house.rooms[0].polygon[:, 0].max() == pytest.approx(2.05)
 
 
-def test_a_piece_fills_its_box_whatever_its_models_units() -> None:
+def test_a_piece_fills_its_box_for_any_units_of_its_model() -> None:
     house = read(piece("elevation='30'"))
     low, high = item(house, "piece_0").bounds
     assert low == pytest.approx([0.5, 0.3, 0.5], abs=1e-6)
@@ -203,7 +203,7 @@ def test_a_piece_fills_its_box_whatever_its_models_units() -> None:
 
 def test_the_front_of_a_piece_looks_down_the_plan() -> None:
     thing = item(read(piece("")), "piece_0")
-    # The wedge's high edge is at its left seen from its back: x is least where y is greatest.
+    # The wedge's high edge is at its left as seen from its back: x is least where y is greatest.
     top = points(thing)[points(thing)[:, 1] > 0.49]
     assert np.allclose(top[:, 0], 0.5)
     assert np.allclose(thing.oriented_box.axes[:, 2], [0, 0, 1])
@@ -244,11 +244,11 @@ def test_a_model_rotation_turns_the_model_inside_its_box() -> None:
     assert low == pytest.approx([0.5, 0.0, 0.5], abs=1e-6)
     assert high == pytest.approx([2.5, 0.5, 1.5], abs=1e-6)
     top = points(thing)[points(thing)[:, 1] > 0.49]
-    # The model's -x side, high, now looks to +z.
+    # The model's high -x side now faces +z.
     assert np.allclose(top[:, 2], 1.5)
 
 
-def test_a_tilted_piece_stands_on_its_elevation() -> None:
+def test_a_tilted_piece_rests_on_its_elevation() -> None:
     thing = item(read(piece(f"pitch='{math.pi / 2}' elevation='20'"), BOX_OBJ), "piece_0")
     low, high = thing.bounds
     assert low[1] == pytest.approx(0.2, abs=1e-5)
@@ -259,7 +259,7 @@ def test_a_tilted_piece_stands_on_its_elevation() -> None:
     "tilt", ["pitch='0.4'", "roll='-0.3'", "angle='1.1' pitch='0.4' roll='0.3'"]
 )
 def test_the_box_of_the_tilted_points_is_centred_on_the_place(tilt: str) -> None:
-    # The wedge is not symmetric: its tilted points have another centre than its box.
+    # The wedge is not symmetric: the centre of its tilted points is not that of its box.
     thing = item(read(piece(f"{tilt} elevation='20'")), "piece_0")
     angle = 1.1 if "angle" in tilt else 0.0
     turned = points(thing) @ rotation_y(-angle)
@@ -269,7 +269,7 @@ def test_the_box_of_the_tilted_points_is_centred_on_the_place(tilt: str) -> None
     assert (centre[0], centre[2]) == pytest.approx((1.5, 1.0), abs=1e-5)
 
 
-def test_pieces_of_a_group_keep_their_own_coordinates() -> None:
+def test_pieces_of_a_group_keep_their_coordinates() -> None:
     group = f"<furnitureGroup name='Set' x='999' y='999' angle='1' width='1' depth='1' height='1'>{piece('')}</furnitureGroup>"
     low, high = item(read(group), "piece_0").bounds
     assert (low + high) / 2 == pytest.approx([1.5, 0.25, 1.0], abs=1e-5)
@@ -286,12 +286,12 @@ def test_invisible_pieces_and_groups_are_left_out() -> None:
     assert not [i for i in house.items if i.kind is ItemKind.OBJECT]
 
 
-def test_a_piece_belongs_to_the_room_it_stands_in() -> None:
+def test_a_piece_belongs_to_the_room_around_it() -> None:
     assert item(read(piece("")), "piece_0").room_id == "0_0"
     assert item(read(piece("x='2000'")), "piece_0").room_id is None
 
 
-def test_stored_cameras_look_where_the_author_looked() -> None:
+def test_stored_cameras_have_the_authors_view() -> None:
     camera = (
         "<observerCamera attribute='storedCamera' name='Door' x='100' y='200' z='160' yaw='0'"
         " pitch='0.1' fieldOfView='1.1'/>"
@@ -328,7 +328,7 @@ def test_rooms_between_walls_end_at_a_doorway(gap_cm: int, n: int) -> None:
     house = read_home(sh3d(home_xml(WALLS + ends, room="")), "test.sh3d")
     areas = sorted(float(shapely.Polygon(r.polygon).area) for r in house.rooms)
     assert len(areas) == n
-    # The doorway's ground is half of one room's, half of the other's.
+    # Half of the doorway's ground belongs to each room.
     expected = [1.45 * 2.9 - 0.05 * (2.9 - 0.9), 2.45 * 2.9 - 0.05 * (2.9 - 0.9)]
     assert n == 1 or areas == pytest.approx(expected, abs=0.01)
     floors = [i for i in house.items if i.kind is ItemKind.FLOOR]

@@ -28,14 +28,14 @@ def look(house: House, item_id: str, surface: int = 0) -> tuple[Surface, Materia
     return s, house.materials[s.material]
 
 
-def test_a_wall_without_a_colour_is_marked_default_and_one_with_is_not() -> None:
+def test_only_a_wall_without_a_colour_is_marked_default() -> None:
     house = read(WALLS.replace("id='a'", "id='a' leftSideColor='FF804020' leftSideShininess='0.5'"))
-    _, left = look(house, "wall_a", 0)
+    _, left_paint = look(house, "wall_a", 0)
     _, right = look(house, "wall_a", 1)
-    assert left.diffuse == pytest.approx((128 / 255, 64 / 255, 32 / 255))
-    assert left.specular == (0.5, 0.5, 0.5)
-    assert left.shininess == 64
-    assert not left.is_default
+    assert left_paint.diffuse == pytest.approx((128 / 255, 64 / 255, 32 / 255))
+    assert left_paint.specular == (0.5, 0.5, 0.5)
+    assert left_paint.shininess == 64
+    assert not left_paint.is_default
     assert right.is_default
     assert right.diffuse == (1.0, 1.0, 1.0)
 
@@ -51,7 +51,7 @@ def test_wall_texture_coordinates_count_tiles_of_the_real_size() -> None:
     assert surface.uvs is not None
     assert np.ptp(surface.uvs[:, 0]) == pytest.approx(4.1 / 0.5, rel=1e-5)
     assert np.ptp(surface.uvs[:, 1]) == pytest.approx(2.5 / 0.25, rel=1e-5)
-    # Not mirrored: u grows to the right of who stands before the left side (towards -z).
+    # Not mirrored: u grows to the right for a viewer facing the left side (towards -z).
     order = surface.positions[:, 0].argsort()
     assert surface.uvs[order[0], 0] > surface.uvs[order[-1], 0]
 
@@ -75,10 +75,10 @@ def test_a_piece_takes_its_models_colours_unless_the_home_overrides_them() -> No
         + piece("color='FF00FF00' shininess='0.25'")
         + piece("color='FF00FF00'", "<material name='white' color='FF0000FF'/>")
     )
-    _, own = look(house, "piece_0")
+    _, override = look(house, "piece_0")
     _, whole = look(house, "piece_1")
     _, named = look(house, "piece_2")
-    assert own.diffuse == pytest.approx((0.64, 0.64, 0.64), abs=0.4)
+    assert override.diffuse == pytest.approx((0.64, 0.64, 0.64), abs=0.4)
     assert whole.diffuse == (0.0, 1.0, 0.0)
     assert whole.shininess == 32
     assert named.diffuse == (0.0, 0.0, 1.0)
@@ -90,7 +90,7 @@ def test_a_material_made_invisible_is_left_out() -> None:
     assert [s.name for s in item(house, "piece_0").surfaces] == ["white"]
 
 
-def test_a_home_texture_lies_in_real_centimetres_on_every_side() -> None:
+def test_a_home_texture_is_in_centimetres_on_every_side() -> None:
     texture = "<texture name='Wood' width='50' height='50' image='t'/>"
     house = read(piece("", texture), {"t": PNG})
     surface, material = look(house, "piece_0")
@@ -104,7 +104,7 @@ def test_a_home_texture_lies_in_real_centimetres_on_every_side() -> None:
     assert uv_area * 0.25 == pytest.approx(area, rel=1e-4)
 
 
-def test_a_models_own_texture_is_found_beside_its_mtl() -> None:
+def test_a_models_texture_is_looked_up_beside_its_mtl() -> None:
     obj = b"mtllib c.mtl\nvt 0 0\n" + BOX_OBJ.replace(b"usemtl white", b"usemtl w").replace(
         b"f 4 3 2 1", b"f 4/1 3/1 2/1 1/1"
     )
@@ -123,7 +123,7 @@ def test_a_models_own_texture_is_found_beside_its_mtl() -> None:
     assert not house.notes or all(n.kind != "missing-texture" for n in house.notes)
 
 
-def test_a_black_material_whose_picture_is_not_there_is_grey() -> None:
+def test_a_black_material_with_a_missing_picture_is_grey() -> None:
     obj = b"mtllib c.mtl\n" + BOX_OBJ.replace(b"usemtl white", b"usemtl w")
     mtl = b"newmtl w\nKd 0 0 0\nmap_Kd pic.png\n"
     house = read(piece("model='2/c/c.obj'"), {"2/c/c.obj": obj, "2/c/c.mtl": mtl})
@@ -140,7 +140,7 @@ def test_a_texture_that_cannot_be_read_is_noted_and_the_colour_stays() -> None:
         assert material.diffuse == pytest.approx((16 / 255, 32 / 255, 48 / 255))
 
 
-def test_panes_of_windows_are_panes_and_of_other_things_glass() -> None:
+def test_glass_of_windows_is_a_pane_and_other_glass_is_glass() -> None:
     window = piece("model='2' catalogId='eTeks#window85x123' y='0' depth='20'", tag="doorOrWindow")
     house = read(WALLS + window + piece("model='2' name='Oven'"), {"2": WINDOW_OBJ})
     thing = item(house, "piece_0")
@@ -149,8 +149,8 @@ def test_panes_of_windows_are_panes_and_of_other_things_glass() -> None:
     assert thing.kind is ItemKind.WINDOW
     assert thing.nyu40 == 9
     assert house.openings[0].is_window
-    other = item(house, "piece_1")
-    assert MaterialKind.GLASS in {house.materials[s.material].kind for s in other.surfaces}
+    vase = item(house, "piece_1")
+    assert MaterialKind.GLASS in {house.materials[s.material].kind for s in vase.surfaces}
 
 
 def test_a_mirror_group_is_a_mirror() -> None:
@@ -162,7 +162,7 @@ def test_a_mirror_group_is_a_mirror() -> None:
 LAMP = "<lightSource x='0.25' y='0.1' z='0.9' color='00FF8000' diameter='0.1'/>"
 
 
-def test_a_light_source_lies_at_its_fractions_from_the_left_front_bottom_corner() -> None:
+def test_a_light_source_is_at_fractions_of_the_box_from_left_front_bottom() -> None:
     house = read(piece("power='0.5'", LAMP, tag="light"))
     lamp = item(house, "piece_0")
     (light,) = lamp.lights
@@ -212,12 +212,12 @@ def test_a_light_source_without_a_body_is_kept_as_a_lamp() -> None:
     assert len(lamp.lights) == 1
 
 
-def test_movable_parts_stand_as_the_home_keeps_them() -> None:
+def test_movable_parts_have_the_pose_saved_in_the_home() -> None:
     obj = BOX_OBJ.replace(b"f 4 3 2 1", b"g sweethome3d_opening_on_hinge_1\nf 4 3 2 1")
     shift = "<transformation name='sweethome3d_hinge_1' matrix='1 0 0 1  0 1 0 0  0 0 1 0'/>"
     house = read(piece("", shift), {"1": obj})
     low, high = item(house, "piece_0").bounds
-    # The moved side widens the model to twice; the box is the home's.
+    # The moved side doubles the model's width; the box is the home's.
     assert [low[0], high[0]] == pytest.approx([0.5, 2.5], abs=1e-6)
     back = item(house, "piece_0").surfaces[0].positions
     moved = back[np.isclose(back[:, 2], 0.5)]

@@ -1,4 +1,4 @@
-"""`read.doors=open`: leaves swing about their hinges, and nothing else changes."""
+"""`read.doors=open`: leaves swing about their hinges, everything else is unchanged."""
 
 from __future__ import annotations
 
@@ -19,9 +19,9 @@ def leaf_points(house: House) -> np.ndarray:
     return points[points[:, 1] < 0.5]
 
 
-def test_an_open_leaf_stands_on_the_side_of_its_hinge() -> None:
+def test_an_open_leaf_is_on_the_side_of_its_hinge() -> None:
     low, high = leaf_points(read("open")).min(0), leaf_points(read("open")).max(0)
-    # It hangs at x = 1.59 and reaches 0.8 m into the room in front: 85 degrees.
+    # The hinge is at x = 1.59 and the leaf reaches 0.8 m into the room at 85 degrees.
     assert high[2] == pytest.approx(0.03 + 0.81 * np.sin(np.radians(85)), abs=0.01)
     assert low[0] > 1.55
     assert high[0] < 1.75
@@ -47,7 +47,7 @@ def test_the_box_of_an_open_door_holds_its_leaf() -> None:
         assert (np.abs(local) <= box.half + 1e-5).all()
 
 
-def test_hole_and_frame_stay_where_they_are() -> None:
+def test_hole_and_frame_do_not_move() -> None:
     drawn, opened = read("drawn"), read("open")
     assert np.array_equal(drawn.openings[0].cutter.positions, opened.openings[0].cutter.positions)
     heads = [
@@ -59,8 +59,8 @@ def test_hole_and_frame_stay_where_they_are() -> None:
 
 @pytest.mark.parametrize("north", ["", NORTH.replace("<room>", "<room ceilingVisible='false'>")])
 def test_a_door_that_leads_outdoors_stays_shut(north: str) -> None:
-    drawn, asked = read("drawn", SOUTH + north), read("open", SOUTH + north)
-    assert np.array_equal(leaf_points(drawn), leaf_points(asked))
+    drawn, opened = read("drawn", SOUTH + north), read("open", SOUTH + north)
+    assert np.array_equal(leaf_points(drawn), leaf_points(opened))
 
 
 def test_a_leaf_that_furniture_blocks_is_left_out_with_a_note() -> None:
@@ -70,7 +70,7 @@ def test_a_leaf_that_furniture_blocks_is_left_out_with_a_note() -> None:
     assert house.notes[-1].kind == "door-leaf-left-out"
 
 
-def test_a_blocked_leaf_of_which_alone_a_door_is_shown_leaves_an_empty_doorway() -> None:
+def test_a_door_whose_only_visible_leaf_is_blocked_leaves_a_doorway() -> None:
     chest = piece("x='200' y='40' width='150' depth='40' height='100'")
     parts = HINGED.replace("g sweethome3d_opening", "usemtl white\ng sweethome3d_opening")
     parts = parts.replace("g frame", "usemtl redwood\ng frame")
@@ -79,7 +79,7 @@ def test_a_blocked_leaf_of_which_alone_a_door_is_shown_leaves_an_empty_doorway()
     house = read("open", obj=parts, inner=hidden, more=chest)
     assert door_of(house).surfaces == ()
     assert [n.kind for n in house.notes] == ["unmapped-class", "door-leaf-left-out"]
-    # Repair cuts the doorway all the same.
+    # Repair cuts the doorway anyway.
     assert [o.item_id for o in house.openings] == ["piece_0"]
 
 
@@ -100,9 +100,9 @@ def test_a_leaf_that_is_a_sheet_swings_open_too(angle: str) -> None:
 
 
 def test_an_archway_has_nothing_to_open() -> None:
-    left = box("frame", (-0.5, 0, -0.1), (-0.45, 2.1, 0.1), 1)
+    left_post = box("frame", (-0.5, 0, -0.1), (-0.45, 2.1, 0.1), 1)
     right = box("frame", (0.45, 0, -0.1), (0.5, 2.1, 0.1), 9)
-    assert read("open", obj=left + right).notes == ()
+    assert read("open", obj=left_post + right).notes == ()
 
 
 def test_doors_as_drawn_keep_the_digest_of_before() -> None:

@@ -1,4 +1,4 @@
-"""Joints of pieces: by the hinges and rails of their models, or as the file tells them."""
+"""Joints of pieces: from the hinges and rails of their models, or from the file."""
 
 from __future__ import annotations
 
@@ -22,8 +22,8 @@ def joint_of_door(house: House) -> Joint:
 
 
 def leaf(house: House) -> np.ndarray:
-    own = [s for s in door_of(house).surfaces if s.part == "leaf 1"]
-    return np.concatenate([s.positions for s in own]).astype(np.float64)
+    leaf_surfaces = [s for s in door_of(house).surfaces if s.part == "leaf 1"]
+    return np.concatenate([s.positions for s in leaf_surfaces]).astype(np.float64)
 
 
 def test_a_leaf_turns_about_the_hinge_of_its_model() -> None:
@@ -31,17 +31,17 @@ def test_a_leaf_turns_about_the_hinge_of_its_model() -> None:
     joint = joint_of_door(house)
     assert (joint.kind, joint.value, joint.upper) == (JointKind.REVOLUTE, 0.0, np.pi / 2)
     assert joint.point[0] == pytest.approx(1.59)
-    # Of a leaf of wood: 0.8 x 2 x 0.04 m.
+    # The mass of a wooden leaf of 0.8 x 2 x 0.04 m.
     assert joint.mass_kg == pytest.approx(0.8 * 2 * 0.04 * 650, rel=0.01)
     wide = transform_points(joint.motion(np.pi / 2), leaf(house))
     assert wide[:, 2].max() == pytest.approx(0.03 + 0.81, abs=0.01)
 
 
 @pytest.mark.parametrize("given", [{}, {"modelMirrored": "true"}, {"angle": "2.0"}])
-def test_a_door_that_was_read_open_shuts_to_where_it_is_drawn(given: dict[str, str]) -> None:
+def test_a_door_read_open_shuts_to_its_drawn_pose(given: dict[str, str]) -> None:
     shut, opened = read("drawn", **given), read("open", **given)
     joint = joint_of_door(opened)
-    if "angle" not in given:  # what leads into no room stays shut
+    if "angle" not in given:  # a door that leads into no room stays shut
         assert joint.value == pytest.approx(np.radians(85))
         assert not np.allclose(leaf(opened), leaf(shut), atol=0.1)
     again = transform_points(joint.motion(0.0), leaf(opened))
@@ -53,7 +53,7 @@ def test_a_leaf_that_was_left_out_has_no_joint() -> None:
     assert door_of(read("open", more=chest)).joints == ()
 
 
-def test_what_hangs_on_a_rail_slides_to_where_the_rail_goes_on() -> None:
+def test_a_part_on_a_rail_slides_along_the_rail() -> None:
     pane = box("sweethome3d_opening_on_rail_1_door", (-0.4, 0, -0.02), (0.0, 2, 0.02), 1)
     rail = box("sweethome3d_rail_1", (-0.4, 2, -0.02), (0.4, 2.02, 0.02), 17)
     joint = joint_of_door(read("drawn", obj=pane + FRAME + rail))
@@ -62,7 +62,7 @@ def test_what_hangs_on_a_rail_slides_to_where_the_rail_goes_on() -> None:
     assert joint.upper == pytest.approx(0.4, abs=1e-6)
 
 
-def told(value: str) -> House:
+def joined_house(value: str) -> House:
     inner = f"<property name='pbrs_farm.joints' value='{value}'/>"
     chest = piece("x='200' y='100' width='80' depth='40' height='200'", inner)
     obj = HINGED.encode()
@@ -76,8 +76,8 @@ def row(**changes: object) -> str:
     return json.dumps([joint])
 
 
-def test_what_the_file_tells_stands_before_what_the_model_names() -> None:
-    house = told(row(upper=1.25, mass_kg=3.0))
+def test_joints_of_the_file_precede_those_of_the_model() -> None:
+    house = joined_house(row(upper=1.25, mass_kg=3.0))
     (joint,) = house.items[-1].joints
     assert (joint.part, joint.upper) == ("door 1", 1.25)
     assert {s.part for s in house.items[-1].surfaces} == {"", "door 1"}
@@ -86,6 +86,6 @@ def test_what_the_file_tells_stands_before_what_the_model_names() -> None:
 @pytest.mark.parametrize(
     "value", ["", "[", "3", row(axis=[0, 2, 0]), row(kind="ball"), row(upper="far"), row(lower=2.0)]
 )
-def test_joints_that_are_none_are_refused_with_file_and_piece(value: str) -> None:
+def test_invalid_joints_are_refused_with_file_and_piece(value: str) -> None:
     with pytest.raises(BadHouse, match=r"test\.sh3d.*Thing.*pbrs_farm\.joints"):
-        told(value)
+        joined_house(value)

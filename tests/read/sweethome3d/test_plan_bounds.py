@@ -1,4 +1,4 @@
-"""Plans that would take minutes to repair are refused by a line; large homes are not."""
+"""Plans that would take minutes to repair are refused with one line; large homes are not."""
 
 import math
 
@@ -24,7 +24,9 @@ def square(x: float, y: float, edge: float) -> str:
 
 
 def spokes(n: int) -> str:
-    """Walls that all cross in one place: n (n - 1) / 2 times."""
+    """Walls that all cross at one point: n (n - 1)
+    2 times.
+    """
     ends = [(300 * math.cos(math.pi * k / n), 300 * math.sin(math.pi * k / n)) for k in range(n)]
     return "".join(wall(k, (-x, -y), (x, y)) for k, (x, y) in enumerate(ends))
 

@@ -129,7 +129,7 @@ def test_a_door_cuts_its_rectangle_through_both_faces() -> None:
     assert shapely.Polygon(opening.quad[:, :2]).area == pytest.approx(2.0, rel=1e-5)
 
 
-def test_a_cutter_is_a_closed_solid_whatever_its_outline() -> None:
+def test_a_cutter_of_any_outline_is_a_closed_solid() -> None:
     for shape in ("M0,0 v1 h1 v-1 z", "M0,1 v-0.8 a0.5,0.2 0 1,1 1,0 v0.8 z",
                   "M0,0.5 a0.5,0.5 0 1,0 1,0 a0.5,0.5 0 1,0 -1,0 z", "M0,0 L1,0 L.5,.5 L1,1 L0,1 z"):  # fmt: skip
         cutter = read(WALL + door(f"cutOutShape='{shape}'")).openings[0].cutter

@@ -35,7 +35,7 @@ def area(path: str) -> float:
         ("M0,0 q.25,.5 .5,0 t.5,0 l0,1 -1,0 z", 1.0),
         ("M0,0 c0,1 .5,1 .5,0 t.5,0 l0,-1 -1,0 z", 1.3),
         ("M0,0 q.25,1 .5,0 s.5,.5 .5,0 l0,-1 -1,0 z", 1 + 1 / 6 + 0.075),
-        # An arc without radius is a line, one that ends where it starts is nothing.
+        # An arc without a radius is a line; one that ends at its start is nothing.
         ("M0,0 a0,0 0 0 1 1,0 a0,0 0 0 1 0,0 v1 h-1 z", 1.0),
     ],
 )
@@ -43,7 +43,7 @@ def test_a_path_encloses_its_area(path: str, expected: float) -> None:
     assert area(path) == pytest.approx(expected, rel=0.01)
 
 
-def test_arcs_are_round_and_end_where_they_say() -> None:
+def test_arcs_are_round_and_end_at_their_end_points() -> None:
     (circle,) = polygons_from_path("M0,0.5 a0.5,0.5 0 1,0 1,0 a0.5,0.5 0 1,0 -1,0 z")
     assert np.linalg.norm(circle - 0.5, axis=1) == pytest.approx(0.5)
     assert shapely.Polygon(circle).area == pytest.approx(math.pi / 4, rel=4e-3)

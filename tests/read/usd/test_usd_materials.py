@@ -1,4 +1,4 @@
-"""Surface shaders of USD beside UsdPreviewSurface, bindings by purpose, and what a picture's node says."""
+"""Surface shaders of USD other than UsdPreviewSurface, bindings by purpose, and inputs of texture nodes."""
 
 from __future__ import annotations
 
@@ -40,17 +40,21 @@ def look(house: House, name: str) -> Material:
 def material(
     home: UsdHome, name: str, kind: str, context: str = "", **inputs: Any
 ) -> tuple[Any, Any]:
-    """(a material of one shader of that id, the shader)."""
-    made = UsdShade.Material.Define(home.stage, f"/World/Looks/{name}")
+    """A material with one shader of that id, and the shader."""
+    material_prim = UsdShade.Material.Define(home.stage, f"/World/Looks/{name}")
     shader = UsdShade.Shader.Define(home.stage, f"/World/Looks/{name}/Shader")
     shader.CreateIdAttr(kind)
     for key, value in inputs.items():
         is_colour = isinstance(value, tuple)
-        given = Gf.Vec3f(*value) if is_colour else value
-        shader.CreateInput(key, Types.Color3f if is_colour else Types.Float).Set(given)
-    out = made.CreateSurfaceOutput(context) if context else made.CreateSurfaceOutput()
+        usd_value = Gf.Vec3f(*value) if is_colour else value
+        shader.CreateInput(key, Types.Color3f if is_colour else Types.Float).Set(usd_value)
+    out = (
+        material_prim.CreateSurfaceOutput(context)
+        if context
+        else material_prim.CreateSurfaceOutput()
+    )
     out.ConnectToSource(shader.CreateOutput("out", Types.Token))
-    return made, shader
+    return material_prim, shader
 
 
 def picture_node(home: UsdHome, name: str, file: str, kind: str = "UsdUVTexture") -> Any:
@@ -76,9 +80,9 @@ def test_surfaces_of_materialx_have_their_colour(
     red, _ = material(home, "Red", kind, "mtlx", **inputs)
     home.box("/World/Table", [1, 0, 1], [2, 1, 2], material=red)
     house = read(home)
-    found = look(house, "Red")
-    assert linear_from_srgb(np.array(found.diffuse)) == pytest.approx(RED, abs=1e-6)
-    assert not found.is_metal
+    red_material = look(house, "Red")
+    assert linear_from_srgb(np.array(red_material.diffuse)) == pytest.approx(RED, abs=1e-6)
+    assert not red_material.is_metal
     assert not house.notes
 
 
@@ -112,15 +116,15 @@ def test_a_shader_that_is_not_understood_is_a_matte_grey_with_a_note(tmp_path: P
     odd, _ = material(home, "Odd", "PxrSurface", "ri", diffuseColor=RED)
     home.box("/World/Table", [1, 0, 1], [2, 1, 2], material=odd)
     house = read(home)
-    found = look(house, "Odd")
-    assert found.diffuse == pytest.approx((0.8,) * 3)
-    assert (found.roughness, found.is_metal) == (None, False)
+    grey_material = look(house, "Odd")
+    assert grey_material.diffuse == pytest.approx((0.8,) * 3)
+    assert (grey_material.roughness, grey_material.is_metal) == (None, False)
     (note,) = house.notes
     assert (note.kind, "PxrSurface" in note.text) == ("unread-part", True)
 
 
 @pytest.mark.parametrize("purpose", ["full", "preview"])
-def test_a_material_bound_for_one_purpose_is_seen(tmp_path: Path, purpose: str) -> None:
+def test_a_material_bound_for_one_purpose_is_used(tmp_path: Path, purpose: str) -> None:
     home = home_with(tmp_path / "a.usda")
     table = home.box("/World/Table", [1, 0, 1], [2, 1, 2])
     binding = UsdShade.MaterialBindingAPI.Apply(table.GetPrim())
@@ -167,7 +171,8 @@ def values_of(house: House, texture: str | None) -> list[int]:
 def test_channel_scale_bias_space_and_fallback_of_a_picture_are_read(tmp_path: Path) -> None:
     (tmp_path / "p.png").write_bytes(png(rgb=(51, 102, 204)))
     home = home_with(tmp_path / "a.usda")
-    # Roughness is blue, halved, and a quarter more; a colour is linear; a file is not there.
+    # Roughness is the blue channel, halved, plus a quarter; one colour is linear; one file is
+    # missing.
     rough, shader = material(home, "rough", "UsdPreviewSurface")
     node = picture_node(home, "rough", "./p.png")
     node.CreateInput("scale", Types.Float4).Set(Gf.Vec4f(1, 1, 0.5, 1))
@@ -184,8 +189,8 @@ def test_channel_scale_bias_space_and_fallback_of_a_picture_are_read(tmp_path: P
     node.CreateInput("fallback", Types.Float4).Set(Gf.Vec4f(*RED, 1))
     rgb = node.CreateOutput("rgb", Types.Float3)
     shader.CreateInput("diffuseColor", Types.Color3f).ConnectToSource(rgb)
-    for k, made in enumerate((rough, raw, lost)):
-        home.box(f"/World/Chair_{k}", [k, 0, 1], [k + 0.5, 1, 2], material=made)
+    for k, material_prim in enumerate((rough, raw, lost)):
+        home.box(f"/World/Chair_{k}", [k, 0, 1], [k + 0.5, 1, 2], material=material_prim)
     house = read(home)
     assert values_of(house, look(house, "rough").roughness_texture_id) == [166] * 3  # .4 + .25
     expected = np.rint(255 * np.array([0.484, 0.665, 0.906]))
@@ -201,10 +206,10 @@ def test_a_mesh_has_the_texture_coordinates_that_its_picture_names(tmp_path: Pat
     home.stage.GetPrimAtPath("/World/Looks/paint/St").GetAttribute("inputs:varname").Set("second")
     table = home.box("/World/Table", [1, 0, 1], [2, 1, 2], material=paint)
     primvars = UsdGeom.PrimvarsAPI(table)
-    other = primvars.CreatePrimvar("second", Types.TexCoord2fArray, UsdGeom.Tokens.faceVarying)
-    other.Set([Gf.Vec2f(3 * u, 3 * v) for u, v in primvars.GetPrimvar("st").Get()])
-    (found,) = [i for i in read(home).items if i.name == "Table"]
-    assert max(s.uvs.max() for s in found.surfaces if s.uvs is not None) == 3
+    second_uvs = primvars.CreatePrimvar("second", Types.TexCoord2fArray, UsdGeom.Tokens.faceVarying)
+    second_uvs.Set([Gf.Vec2f(3 * u, 3 * v) for u, v in primvars.GetPrimvar("st").Get()])
+    (item,) = [i for i in read(home).items if i.name == "Table"]
+    assert max(s.uvs.max() for s in item.surfaces if s.uvs is not None) == 3
 
 
 def test_a_picture_that_is_connected_to_itself_is_no_picture(tmp_path: Path) -> None:

@@ -1,4 +1,4 @@
-"""Opacity of USD materials that has a picture of its own."""
+"""Opacity of USD materials from a separate picture."""
 
 from __future__ import annotations
 
@@ -16,16 +16,16 @@ from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve
 from tests.inputs.usd_files import UsdHome, walls_of
 
-RGB, MASK = (200, 40, 30), ((0, 255, 102, 255), (255, 255, 255, 255))  # of a 4 x 2 picture
+RGB, MASK = (200, 40, 30), ((0, 255, 102, 255), (255, 255, 255, 255))  # a 4 x 2 picture
 
 
 def leaf(tmp_path: Path, *, colour: str, mask: str, channel: str = "r", **inputs: float) -> House:
     """A room with a chair whose opacity is a channel of a picture."""
     home = UsdHome(tmp_path / "a.usda")
     walls_of(home, "/World", 0, 4, 0, 3)
-    given = {"picture": colour} if colour else {"rgb": (0.5, 0.5, 0.5)}
+    colour_input = {"picture": colour} if colour else {"rgb": (0.5, 0.5, 0.5)}
     scale, bias = inputs.pop("scale", None), inputs.pop("bias", None)
-    material = home.material("Leaf", **given, **inputs)
+    material = home.material("Leaf", **colour_input, **inputs)
     stage, types = home.stage, Sdf.ValueTypeNames
     node = UsdShade.Shader.Define(stage, "/World/Looks/Leaf/Mask")
     node.CreateIdAttr("UsdUVTexture")
@@ -45,9 +45,9 @@ def pictures(tmp_path: Path) -> Path:
     Image.new("RGB", (4, 2), RGB).save(tmp_path / "colour.png")
     grey = Image.fromarray(np.array(MASK, np.uint8))
     grey.save(tmp_path / "mask.png")
-    both = Image.new("RGB", (4, 2), RGB)
-    both.putalpha(grey)
-    both.save(tmp_path / "both.png")
+    rgba = Image.new("RGB", (4, 2), RGB)
+    rgba.putalpha(grey)
+    rgba.save(tmp_path / "both.png")
     return tmp_path
 
 
@@ -67,9 +67,9 @@ def test_a_picture_of_opacity_cuts_at_the_threshold(pictures: Path, colour: str)
     material = chair(house)
     assert (material.alpha_cutout, material.alpha_cutoff) == (True, pytest.approx(0.3))
     assert (material.kind, material.opacity) == (MaterialKind.OPAQUE, 1.0)
-    found = pixels(house)
-    assert np.array_equal(found[..., 3], MASK)
-    assert (found[..., :3] == (RGB if colour else (255, 255, 255))).all()
+    rgba = pixels(house)
+    assert np.array_equal(rgba[..., 3], MASK)
+    assert (rgba[..., :3] == (RGB if colour else (255, 255, 255))).all()
     assert not [n for n in house.notes if n.kind.endswith(("texture", "layout"))]
 
 

@@ -1,4 +1,4 @@
-"""OpenUSD stages built with the library, read as houses."""
+"""OpenUSD stages written with the library and read as houses."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_unit_and_axis_give_the_same_house(
     assert len(house.openings) == 1
 
 
-def test_a_triangle_looks_the_way_its_orientation_says(tmp_path: Path) -> None:
+def test_orientation_gives_the_side_of_a_triangle(tmp_path: Path) -> None:
     home = room_home(tmp_path / "a.usda")
     up = [[[1, 1, 2], [2, 1, 2], [2, 1, 1], [1, 1, 1]]]
     home.quads("/World/Table_a", up)
@@ -73,7 +73,7 @@ def test_hidden_proxies_guides_and_inactive_prims_are_not_read(tmp_path: Path) -
     assert [i.name for i in read(home).items if i.name.startswith("Chair")] == ["Chair_5"]
 
 
-def test_labels_old_and_new_say_the_class_and_a_component_is_one_item(tmp_path: Path) -> None:
+def test_old_and_new_labels_give_the_class_and_a_component_is_one_item(tmp_path: Path) -> None:
     home = room_home(tmp_path / "a.usda")
     new = home.box("/World/Obj_1", [1, 0, 1], [2, 1, 2]).GetPrim()
     set_label(new, "sofa")
@@ -102,7 +102,7 @@ def test_the_size_of_a_component_decides_about_its_name(tmp_path: Path) -> None:
     assert kinds == [ItemKind.GROUND, ItemKind.PLANT]
 
 
-def test_instances_are_items_of_their_own_and_variants_and_payloads_are_followed(
+def test_instances_are_separate_items_and_variants_and_payloads_are_followed(
     tmp_path: Path,
 ) -> None:
     chair = UsdHome(tmp_path / "chair.usda")
@@ -139,8 +139,8 @@ def test_a_point_instancer_places_its_prototypes(tmp_path: Path) -> None:
     many.CreateProtoIndicesAttr([0, 0, 0])
     many.CreatePositionsAttr([(1, -1, 0), (2, -1, 0), (3, -1, 0)])
     many.InvisibleIds = many.CreateInvisibleIdsAttr([1])
-    found = sorted(i.bounds[0, 0] for i in read(home).items if i.name == "Chair")
-    assert np.allclose(found, [1, 3], atol=1e-5)
+    chair_xs = sorted(i.bounds[0, 0] for i in read(home).items if i.name == "Chair")
+    assert np.allclose(chair_xs, [1, 3], atol=1e-5)
 
 
 def test_solids_have_their_size_and_axis(tmp_path: Path) -> None:
@@ -160,7 +160,7 @@ def test_solids_have_their_size_and_axis(tmp_path: Path) -> None:
         assert np.allclose(high - low, size, atol=0.01), name
 
 
-def test_subsets_have_their_own_materials_and_glass_of_a_window_is_a_pane(tmp_path: Path) -> None:
+def test_subsets_keep_their_materials_and_glass_of_a_window_is_a_pane(tmp_path: Path) -> None:
     home = room_home(tmp_path / "a.usda")
     mesh = home.box(
         "/World/Cabinet", [1, 0, 1], [2, 1, 2], material=home.material("Oak", (0.5, 0.2, 0.1))
@@ -169,10 +169,10 @@ def test_subsets_have_their_own_materials_and_glass_of_a_window_is_a_pane(tmp_pa
     subset = UsdShade.MaterialBindingAPI(mesh).CreateMaterialBindSubset("front", [0, 1])
     UsdShade.MaterialBindingAPI.Apply(subset.GetPrim()).Bind(red)
     house = read(home)
-    found = {
+    materials = {
         house.materials[s.material].name: len(s.faces) for s in item(house, "Cabinet").surfaces
     }
-    assert found == {"Oak": 8, "Red": 4}
+    assert materials == {"Oak": 8, "Red": 4}
     (pane,) = item(house, "Window_1").surfaces
     assert house.materials[pane.material].kind is MaterialKind.PANE
 
@@ -202,7 +202,7 @@ def test_omnipbr_glass_and_other_mdl(tmp_path: Path) -> None:
     ]
 
 
-def test_lights_stand_where_they_are_told_and_suns_are_the_recipes(tmp_path: Path) -> None:
+def test_lights_keep_their_place_and_suns_come_from_the_recipe(tmp_path: Path) -> None:
     home = room_home(tmp_path / "a.usda", 0.01)
     home.sphere_light("/World/Bulb", [2, 2, 1], 0.04)
     rect = UsdLux.RectLight.Define(home.stage, "/World/Panel")
@@ -303,7 +303,7 @@ DAMAGED = {
 
 
 @pytest.mark.parametrize("case", DAMAGED)
-def test_a_damaged_file_is_one_line_that_names_the_place(tmp_path: Path, case: str) -> None:
+def test_a_damaged_file_is_refused_with_its_place(tmp_path: Path, case: str) -> None:
     data, text = DAMAGED[case]
     path = tmp_path / ("a.usdc" if case == "crate" else "a.usda")
     path.write_bytes(data)

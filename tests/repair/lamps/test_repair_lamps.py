@@ -1,4 +1,4 @@
-"""Bulbs, escape and shades of single lamps, built in code."""
+"""Bulbs, openings and shades of single lamps, built in code."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def _with_shades(house: House) -> tuple[House, float, float]:
     return house, before, after
 
 
-def test_the_bulb_has_the_sources_radius_where_there_is_room() -> None:
+def test_the_bulb_has_the_sources_radius_if_it_fits() -> None:
     house, (source,) = with_bulbs(_lamp(_ball(0.2)), FIELDS)
     assert (source.bulb_added, source.radius_m, source.moved_m) == (True, 0.03, 0.0)
     bulb = house.items[0].surfaces[house.items[0].lights[0].emitting[0]]
@@ -86,7 +86,7 @@ def test_the_bulb_has_the_sources_radius_where_there_is_room() -> None:
 def test_the_bulb_touches_nothing_of_its_lamp(
     centre: tuple[float, float, float], radius: float
 ) -> None:
-    # Whatever ball stands in the way, through the light's centre or around it.
+    # For any obstructing ball, through the light's centre or around it.
     lamp = _lamp(_ball(radius, centre))
     house, (source,) = with_bulbs(lamp, FIELDS)
     place = np.array(house.items[0].lights[0].position)
@@ -102,7 +102,7 @@ def test_a_naked_bulb_loses_nothing() -> None:
 
 def test_half_a_ball_around_the_bulb_leaves_half_the_light() -> None:
     house, before, after = _with_shades(_lamp(_half_ball(0.2)))
-    # The sphere has equator triangles on both sides: nearly half of it is left.
+    # The sphere has equator triangles on both sides: nearly half of it remains.
     part = house.items[0].surfaces[0]
     covered = face_areas(triangle_corners(part.positions, part.faces))
     assert before == after == pytest.approx(1 - covered.sum() / (4 * np.pi * 0.04), abs=0.03)
@@ -119,13 +119,13 @@ def test_a_closed_ball_becomes_a_shade_that_lets_its_share_through() -> None:
 def test_only_the_part_that_encloses_becomes_a_shade() -> None:
     # Shade and foot are one surface of one material; the foot stays opaque.
     ball, foot = _ball(0.2), _ball(0.1, (0.0, -0.6, 0.0))
-    both = replace(
+    merged = replace(
         ball,
         positions=np.concatenate([ball.positions, foot.positions]),
         faces=np.concatenate([ball.faces, foot.faces + len(ball.positions)]),
         normals=None,
     )
-    house, _, after = _with_shades(_lamp(both))
+    house, _, after = _with_shades(_lamp(merged))
     kinds = [house.materials[s.material].kind for s in house.items[0].surfaces]
     assert kinds == [MaterialKind.OPAQUE, MaterialKind.BULB, MaterialKind.SHADE]
     assert [len(s.faces) for s in house.items[0].surfaces][::2] == [
@@ -148,7 +148,7 @@ def _below(lamp: House, *structure: Item) -> House:
 
 
 def test_a_cup_that_the_ceiling_closes_keeps_its_light_and_becomes_a_shade() -> None:
-    # Open above: without the ceiling it hangs from, half of its light would leave.
+    # Open at the top: without the ceiling above, half of its light would leave.
     cup = _half_ball(0.2)
     turned = cup.positions * np.float32([1, -1, 1]) + np.float32([0, 0.08, 0])
     cup = replace(cup, positions=turned, faces=cup.faces[:, ::-1].copy())
@@ -203,11 +203,11 @@ def test_the_fallback_light_can_be_switched_off() -> None:
     assert {r.lit_by for r in house.rooms} == {()}
 
 
-def test_a_room_with_a_window_and_no_lamp_gets_one_where_the_recipe_says_so() -> None:
+def test_a_windowed_room_without_a_lamp_gets_one_if_the_recipe_asks() -> None:
     home = builtin_home()
     day = replace(home, items=tuple(i for i in home.items if not i.lights))
-    kept, report = repair(day, FIELDS)
-    assert {r.lit_by for r in kept.rooms} == {("windows",)}
+    lit, report = repair(day, FIELDS)
+    assert {r.lit_by for r in lit.rooms} == {("windows",)}
     assert report.added_lamps == ()
     house, report = repair(day, RepairFields(lamp_in_every_room=True))
     assert report.added_lamps == ("0_0", "0_1")
@@ -229,7 +229,7 @@ def test_an_added_lamps_flux_follows_the_rooms_area() -> None:
 
 
 @pytest.mark.parametrize(("lux", "lumen"), [(1, 600), (1_000, 10_000)])
-def test_an_added_lamps_flux_is_what_one_lamp_gives(lux: float, lumen: float) -> None:
+def test_an_added_lamp_has_the_flux_of_one_lamp(lux: float, lumen: float) -> None:
     home = builtin_home()
     day = replace(home, items=tuple(i for i in home.items if not i.lights))
     house, _ = repair(day, RepairFields(lamp_in_every_room=True, lamp_lx=lux))
@@ -293,7 +293,7 @@ def test_a_lamp_below_a_slope_hangs_from_a_cord() -> None:
     assert [s.name for s in lamp.surfaces] == ["bulb", "cord"]
 
 
-def test_a_room_with_a_lamp_of_its_own_gets_no_other() -> None:
+def test_a_room_with_a_lamp_gets_no_other() -> None:
     home = builtin_home()
     _, report = repair(home, RepairFields(lamp_in_every_room=True))
     assert (report.added_lamps, report.fallback_lights) == ((), ())
@@ -306,7 +306,7 @@ def test_a_room_with_a_lamp_of_its_own_gets_no_other() -> None:
         ("", (), True),
         ("Balcony", (), False),
         ("Garage 2", (), False),
-        ("Südterrasse", (), True),  # a compound is not taken apart
+        ("Südterrasse", (), True),  # compounds are not split
         ("Große Terrasse", (), False),
         ("Jardín", (), False),
         ("Balcão", (), False),
@@ -329,12 +329,12 @@ def test_people_do_not_live_on_balconies_in_any_language(
 
 
 def _place(home: House, room: Room) -> F64:
-    found = place_of_lamp(home, room)
-    assert found is not None
-    return found
+    place = place_of_lamp(home, room)
+    assert place is not None
+    return place
 
 
-def test_the_added_lamp_hangs_clear_of_what_reaches_the_ceiling() -> None:
+def test_the_added_lamp_hangs_clear_of_items_as_high_as_the_ceiling() -> None:
     home = builtin_home()
     room = home.rooms[0]
     (x0, z0), (x1, z1) = room.polygon.min(0), room.polygon.max(0)
@@ -348,7 +348,7 @@ def test_the_added_lamp_hangs_clear_of_what_reaches_the_ceiling() -> None:
     assert _place(home.with_items([*home.items, tall]), room)[0] > middle + 0.5
 
 
-def test_the_added_lamp_hangs_in_no_wall_that_stands_inside_the_room() -> None:
+def test_the_added_lamp_hangs_in_no_wall_inside_the_room() -> None:
     home = builtin_home()
     room = home.rooms[0]
     x, y, z = _place(home, room)
@@ -357,9 +357,9 @@ def test_the_added_lamp_hangs_in_no_wall_that_stands_inside_the_room() -> None:
         "part", np.array([x, (low + high) / 2, z]), np.array([0.06, (high - low) / 2, 9.0]), 0
     )
     wall = Item("partition", "partition", ItemKind.WALL, room.level_id, (part,))
-    there = _place(home.with_items([*home.items, wall]), room)
-    assert abs(there[0] - x) > 0.3
-    assert there[1] == y
+    lamp_place = _place(home.with_items([*home.items, wall]), room)
+    assert abs(lamp_place[0] - x) > 0.3
+    assert lamp_place[1] == y
 
 
 def _with_slope() -> tuple[House, Room]:
@@ -374,7 +374,7 @@ def _with_slope() -> tuple[House, Room]:
     return home.with_items([*items, roof]), room
 
 
-def test_the_added_lamp_hangs_below_a_sloped_ceiling_where_it_is_high() -> None:
+def test_the_added_lamp_hangs_below_the_high_side_of_a_sloped_ceiling() -> None:
     home, room = _with_slope()
     x0, x1 = room.polygon[:, 0].min(), room.polygon[:, 0].max()
     x, y, _ = _place(home, room)
@@ -382,33 +382,33 @@ def test_the_added_lamp_hangs_below_a_sloped_ceiling_where_it_is_high() -> None:
     assert y > 2.1
 
 
-def test_an_added_lamp_hangs_from_what_is_there_and_never_from_the_sky() -> None:
+def test_an_added_lamp_hangs_from_existing_surfaces_and_never_from_the_sky() -> None:
     home = builtin_home()
     room = home.rooms[0]
     (x0, z0), (x1, z1) = room.polygon.min(0), room.polygon.max(0)
-    # A ceiling over the first third of the room alone.
+    # A ceiling over only the first third of the room.
     end, y = x0 + (x1 - x0) / 3, room.ceiling_y
     quad = np.array([[x0, y, z0], [end, y, z0], [end, y, z1], [x0, y, z1]], np.float32)
     part = Surface("part", quad, np.array([[0, 1, 2], [0, 2, 3]], np.int32), 0)
     items = [i for i in home.items if i.kind is not ItemKind.CEILING]
     third = Item("third", "", ItemKind.CEILING, "0", (part,))
-    there = place_of_lamp(home.with_items([*items, third]), room)
-    assert there is not None
-    assert x0 < there[0] < end
+    lamp_place = place_of_lamp(home.with_items([*items, third]), room)
+    assert lamp_place is not None
+    assert x0 < lamp_place[0] < end
     assert place_of_lamp(home.with_items(items), room) is None
-    # A roof that is drawn as a thing carries a lamp as well.
+    # A roof modelled as an item carries a lamp as well.
     high = replace(part, positions=part.positions + np.array([0, 0.3, 0], np.float32))
     thing = Item("roof", "", ItemKind.OBJECT, "0", (high,), nyu40=OTHERSTRUCTURE)
     assert place_of_lamp(home.with_items([*items, thing]), room) is not None
 
 
-def test_a_room_said_to_have_a_ceiling_that_is_not_there_is_lit_by_the_sky() -> None:
+def test_a_room_with_a_declared_but_missing_ceiling_is_lit_by_the_sky() -> None:
     home = builtin_home()
     items = [i for i in home.items if not i.lights and i.kind is not ItemKind.CEILING]
     bare = replace(home, openings=()).with_items(items)
-    house, given = with_room_lighting(bare, fallback=True, in_every_room=True)
+    house, n_added = with_room_lighting(bare, fallback=True, in_every_room=True)
     assert {r.lit_by for r in house.rooms} == {("sky",)}
-    assert (given.fallback, given.added) == ((), ())
+    assert (n_added.fallback, n_added.added) == ((), ())
 
 
 def test_a_room_without_a_ceiling_is_lit_by_the_sky_unless_a_storey_is_above() -> None:

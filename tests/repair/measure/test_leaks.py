@@ -1,4 +1,4 @@
-"""The leak meter finds the leaks that are there, and repair closes them."""
+"""The leak meter finds existing leaks, and repair closes them."""
 
 from __future__ import annotations
 
@@ -42,7 +42,7 @@ def test_a_wall_that_misses_its_neighbours_is_joined_to_them() -> None:
     assert report.leaks.n_sky == 0
 
 
-def test_without_the_joints_the_meter_counts_and_says_where(
+def test_without_the_joints_the_meter_counts_and_places_leaks(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     monkeypatch.setattr(structure, "joints_between_walls", lambda *_: ([], 0))
@@ -66,7 +66,7 @@ def test_the_meter_counts_the_open_share_of_a_box() -> None:
     corners = np.array([[x, y, z] for x in (0, 1) for y in (0, 1) for z in (0, 1)], np.float32)
     sides = [[0, 1, 3, 2], [4, 6, 7, 5], [0, 2, 6, 4], [1, 5, 7, 3], [0, 4, 5, 1]]
     faces = np.array([t for a, b, c, d in sides for t in ((a, b, c), (a, c, d))], np.int32)
-    # Fronts look into the cube.
+    # Faces point into the cube.
     centre = corners[faces].mean(1) - 0.5
     normal = np.cross(
         corners[faces[:, 1]] - corners[faces[:, 0]], corners[faces[:, 2]] - corners[faces[:, 0]]
@@ -103,7 +103,7 @@ def test_a_room_without_a_ceiling_is_open() -> None:
     assert house.rooms[1].enclosure_reason == "15.6 m2 of it have no ceiling"
 
 
-def test_rooms_with_no_wall_between_them_are_one_space() -> None:
+def test_rooms_without_a_wall_between_them_are_one_space() -> None:
     home = builtin_home()
     items = [i for i in home.items if i.id != "wall_4"]
     rooms = (home.rooms[0], replace(home.rooms[1], polygon=home.rooms[1].polygon - [0.1, 0.0]))

@@ -1,4 +1,4 @@
-"""Where the leak meter starts its rays: inside rooms, under roofs that are solids as well."""
+"""Start points of the leak meter's rays: inside rooms, also under solid roofs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,8 @@ from pbrs_farm.repair.structure.prisms import Plane, level_plane
 from tests.repair.wall_rooms import room
 
 ROOM: Room = room("0_0", (0, 0, 6, 4), ceiling_y=3.0)
-# Two roofs that rise from 1 m to 3 m at x = 2 and fall to 1 m at x = 4, both reaching over all.
+# Two roofs that rise from 1 m to 3 m at x = 2 and fall to 1 m at x = 4, both extending over
+# everything.
 RISING, FALLING = Plane(1.0, 0.0, 1.0), Plane(-1.0, 0.0, 5.0)
 ALL = shapely.box(-1, -1, 7, 5)
 
@@ -43,6 +44,6 @@ def test_of_two_equal_ceilings_one_counts() -> None:
     assert heights_at([low, low], 4.0) == [3.0]
 
 
-def test_floors_and_what_lies_on_the_floor_are_no_ceiling() -> None:
+def test_floors_and_rugs_are_no_ceiling() -> None:
     low = [Cover(False, ALL, level_plane(2.2)), Cover(True, ALL, level_plane(0.05))]
     assert heights_at(low, 1.0) == [3.0]

@@ -41,10 +41,12 @@ def _area_seen_from_below(items: list[Item]) -> float:
     return float(shapely.area(shapely.union_all(shapely.polygons(down[:, :, [0, 2]]))))
 
 
-def test_a_roofless_room_is_closed_at_its_walls_height_and_its_lamp_hangs_there() -> None:
+def test_a_roofless_room_is_closed_at_its_walls_height_with_its_lamp() -> None:
     after, report = repair(_open(ceiling_y=2.9), ON)
     (ceiling,) = _ceilings(after)
-    assert ceiling.bounds[0, 1] == pytest.approx(2.5, abs=1e-6)  # the walls', not the room's 2.9
+    assert ceiling.bounds[0, 1] == pytest.approx(
+        2.5, abs=1e-6
+    )  # height of the walls, rather than the room's 2.9
     assert (ceiling.nyu40, ceiling.room_id) == (CEILING, "0_0")
     assert after.rooms[0].has_ceiling
     assert (after.rooms[0].ceiling_y, report.added_ceilings) == (2.5, ("0_0",))
@@ -57,7 +59,7 @@ def test_a_roofless_room_is_closed_at_its_walls_height_and_its_lamp_hangs_there(
 def test_without_the_field_the_sky_stays() -> None:
     after, report = repair(_open(), RepairFields(lamp_in_every_room=True))
     assert (_ceilings(after), report.added_ceilings) == ([], ())
-    # And no lamp hangs from it.
+    # No lamp is added to it.
     assert [i for i in after.items if i.kind is ItemKind.LAMP] == []
     assert report.added_lamps == ()
 
@@ -76,7 +78,7 @@ def test_outdoors_parapets_and_free_edges_stay_open(name: str, walls: list[Item]
 
 
 def test_a_ceiling_slopes_with_the_tops_of_the_walls() -> None:
-    # The wall along y = 0 is 2.5 m high, the one across 2 m; the others lead from one to the other.
+    # The wall along y = 0 is 2.5 m high, the opposite one 2 m; the others slope between them.
     walls = WALLS.replace("id='b'", "id='b' height='250' heightAtEnd='200'")
     walls = walls.replace("id='c'", "id='c' height='200'")
     walls = walls.replace("id='d'", "id='d' height='200' heightAtEnd='250'")
@@ -84,14 +86,14 @@ def test_a_ceiling_slopes_with_the_tops_of_the_walls() -> None:
     drawn = read_home(home_xml(walls), "a.sh3d")
     roofless = read_home(home_xml(walls, room=bare), "a.sh3d")
     (expected,) = _ceilings(drawn)
-    (made,) = _ceilings(repair(roofless, ON)[0])
+    (ceiling,) = _ceilings(repair(roofless, ON)[0])
     (built,) = _ceilings(repair(drawn, ON)[0])
-    assert made.bounds == pytest.approx(built.bounds, abs=0.02)
+    assert ceiling.bounds == pytest.approx(built.bounds, abs=0.02)
     assert np.ptp(expected.bounds[:, 1]) > 0.4
 
 
 def _two_storeys(*, upper_ceiling: bool) -> House:
-    """A room on a room, the lower one without a ceiling of its own."""
+    """One room above another, the lower one without a ceiling."""
     low = replace(room("0_0", RECT), has_ceiling=False)
     high = replace(room("1_0", RECT, floor_y=2.6, ceiling_y=5.1), has_ceiling=upper_ceiling)
     upper_walls = [replace(w, level_id="1") for w in walls_around(RECT, "u", bottom=2.6, top=5.1)]
@@ -107,18 +109,18 @@ def test_the_underside_of_the_upper_floor_is_ceiling() -> None:
     assert (under.id, under.nyu40, under.room_id) == ("underside_floor_1_0", CEILING, "0_0")
     assert _area_seen_from_below([under]) >= 12.0 - 1e-6
     assert _area_seen_from_below([i for i in after.items if i.id == "floor_1_0"]) == 0.0
-    # Instance ids of what stood there before stay.
+    # Existing items keep their instance ids.
     assert [i.id for i in after.items][: len(before.items)] == [i.id for i in before.items]
 
 
-def test_a_floor_that_a_ceiling_hides_in_part_is_ceiling_where_it_is_seen() -> None:
+def test_the_visible_part_of_a_half_hidden_floor_is_a_ceiling() -> None:
     before = _two_storeys(upper_ceiling=True)
     low, high = before.rooms
     hung = covers(room("0_0", (0.0, 0.0, 2.0, 3.0), ceiling_y=2.3), floor=False)
     low = replace(low, has_ceiling=True)
     after, _report = repair(replace(before, rooms=(low, high)).with_items([*before.items, *hung]), RepairFields())  # fmt: skip
     assert "underside_floor_1_0" in [i.id for i in after.items]
-    # A ceiling over all of the room hides it.
+    # A ceiling over the whole room hides it.
     whole = covers(room("0_0", RECT, ceiling_y=2.3), floor=False)
     after, _report = repair(replace(before, rooms=(low, high)).with_items([*before.items, *whole]), RepairFields())  # fmt: skip
     assert "underside_floor_1_0" not in [i.id for i in after.items]
@@ -135,19 +137,19 @@ def test_the_underside_of_a_balcony_is_ceiling_over_the_ground() -> None:
     after, _report = repair(replace(before, rooms=rooms).with_items([*before.items, slab, ground]), RepairFields())  # fmt: skip
     (under,) = [i for i in after.items if i.id == "underside_floor_1_1"]
     assert (under.nyu40, under.room_id) == (CEILING, None)
-    # The lowest floor is seen from nowhere.
+    # The lowest floor is not visible from below.
     assert "underside_floor_0_0" not in [i.id for i in after.items]
 
 
-def test_each_of_two_roofless_storeys_gets_its_own_ceiling() -> None:
+def test_each_of_two_roofless_storeys_gets_a_ceiling() -> None:
     after, report = repair(_two_storeys(upper_ceiling=False), ON)
     assert sorted(report.added_ceilings) == ["0_0", "1_0"]
     heights = {i.room_id: round(float(i.bounds[0, 1]), 3) for i in _ceilings(after)}
-    assert heights == {"0_0": 2.48, "1_0": 5.1}  # below the slab that the upper floor becomes
+    assert heights == {"0_0": 2.48, "1_0": 5.1}  # below the slab of the upper floor
 
 
 def test_a_void_whose_ceiling_is_a_storey_higher_and_stairs_stay_open() -> None:
-    # The upper floor covers the left half alone; over the right half its ceiling is seen.
+    # The upper floor covers only the left half; over the right half its ceiling is visible.
     before = _two_storeys(upper_ceiling=True)
     low, high = before.rooms
     half = replace(high, polygon=room("1_0", (0.0, 0.0, 2.0, 3.0)).polygon)
@@ -156,13 +158,13 @@ def test_a_void_whose_ceiling_is_a_storey_higher_and_stairs_stay_open() -> None:
     after, _report = repair(
         replace(before, items=(*items, *covers(half, ceiling=False), stairs), rooms=(low, high)), ON
     )
-    (made,) = [i for i in after.items if i.id == "added_ceiling_0_0"]
-    seen = _area_seen_from_below([made])
-    assert 4.5 < seen < 6.5  # half of 12 m2, less the stairs, more what lies over the walls
+    (ceiling,) = [i for i in after.items if i.id == "added_ceiling_0_0"]
+    visible_m2 = _area_seen_from_below([ceiling])
+    assert 4.5 < visible_m2 < 6.5  # half of 12 m2, minus the stairs, plus the area over the walls
 
 
-def test_rooms_nobody_drew_are_what_walls_enclose() -> None:
-    # A wall across parts the home in two; a fence around it encloses nothing.
+def test_undrawn_rooms_are_the_areas_enclosed_by_walls() -> None:
+    # A transverse wall divides the home; a fence around it encloses nothing.
     across = "<wall id='e' xStart='200' yStart='0' xEnd='200' yEnd='298' thickness='10'/>"
     fence = "".join(
         f"<wall id='f{k}' xStart='{a}' yStart='{b}' xEnd='{c}' yEnd='{d}' thickness='5' height='120'/>"

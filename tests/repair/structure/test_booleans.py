@@ -1,4 +1,4 @@
-"""What goes to manifold3d, and what does not: an open mesh may kill the process."""
+"""manifold3d gets closed meshes only: an open one could kill the process."""
 
 from __future__ import annotations
 
@@ -20,7 +20,7 @@ SEEDS_THAT_KILLED = (132, 142, 152, 168, 170, 186)
 
 
 def _fan(n: int, seed: int) -> Patch:
-    """n corners round the origin at random angles and distances, all triangles at the first."""
+    """n corners round the origin at random angles and distances; all triangles share the first."""
     rng = np.random.default_rng(seed)
     angle, distance = np.sort(rng.uniform(0, 2 * np.pi, n)), rng.uniform(1, 4, n)
     plan = np.stack([distance * np.cos(angle), distance * np.sin(angle)], 1).astype(np.float32)
@@ -31,7 +31,7 @@ def _fan(n: int, seed: int) -> Patch:
 
 @pytest.fixture
 def no_open_mesh(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Fail where manifold3d is given an edge without its reverse."""
+    """Fail if manifold3d gets an edge without its reverse."""
     real = manifold3d.Mesh64
 
     def watched(vertices, faces, **more):  # type: ignore[no-untyped-def]
@@ -68,8 +68,8 @@ def test_a_room_of_seven_corners_under_flat_sheets_is_repaired(
         walls.append(Item(f"p{k}", f"p{k}", ItemKind.WALL, "0", (sheet,), nyu40=1))
     # A rug of five triangles: furniture is measured as solids, too.
     rug = Item("rug", "rug", ItemKind.OBJECT, "0", (horizontal("rug", [[plan * 0.5]], 0.01, FLOOR, up=True),))  # fmt: skip
-    other = Item("mat", "mat", ItemKind.OBJECT, "0", rug.surfaces)
-    items = [*walls, *covers(r), rug, other]
+    mat = Item("mat", "mat", ItemKind.OBJECT, "0", rug.surfaces)
+    items = [*walls, *covers(r), rug, mat]
     after, report = repair(house(items, [r]), RepairFields(), occluder_from=EmbreeOccluder)
     assert after.rooms[0].enclosure is Enclosure.CLOSED
     assert len(unpaired_edges(after)) == 0

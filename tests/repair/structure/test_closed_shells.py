@@ -21,11 +21,11 @@ def test_the_pot_of_a_plant_is_found_among_20_000_leaves() -> None:
     places = rng.uniform(1, 2, (20_000, 1, 3)) + rng.uniform(0, 0.02, (20_000, 3, 3))
     corners = places.reshape(-1, 3).astype(np.float32)
     faces = np.arange(60_000, dtype=np.int32).reshape(-1, 3)
-    found = closed_shells(_item(Surface("leaves", corners, faces, 0), _pot(0.0)), TagTable())
-    assert [round(float(s.volume()), 6) for s in found] == [0.016]
+    shells = closed_shells(_item(Surface("leaves", corners, faces, 0), _pot(0.0)), TagTable())
+    assert [round(float(s.volume()), 6) for s in shells] == [0.016]
 
 
-def test_a_shell_of_several_has_the_vertices_it_uses_alone() -> None:
+def test_a_shell_of_several_has_only_the_vertices_it_uses() -> None:
     two = _item(_pot(0.0), _pot(1.0))
     shells = shells_from_item(two, 0, TagTable())
     assert shells is not None

@@ -1,4 +1,4 @@
-"""Frames that lie in the faces of their walls are moved half a millimetre apart."""
+"""Frames coplanar with their walls are moved half a millimetre."""
 
 from __future__ import annotations
 
@@ -51,7 +51,7 @@ def test_moving_apart_twice_is_moving_once() -> None:
     ([1.0, 1.4, 0.0], [0.3, 0.4, 0.0], 2, MOVED_M),  # a picture drawn on the wall below z = 0
     ([2.0, 0.0, 1.5], [0.6, 0.0, 0.4], 1, MOVED_M),  # a rug drawn on the floor
 ])  # fmt: skip
-def test_a_thing_drawn_on_a_wall_or_floor_is_moved_out_of_it(
+def test_an_item_coplanar_with_a_wall_or_floor_is_moved_out_of_it(
     centre: list[float], half: list[float], axis: int, moved_to: float
 ) -> None:
     r = room("0_0", RECT)
@@ -66,7 +66,7 @@ def test_a_thing_drawn_on_a_wall_or_floor_is_moved_out_of_it(
 
 
 def _oven(pane_depth_m: float, pane_half_m: float = 0.2) -> Item:
-    """An oven with its front at z = 0.5, and a pane in it that reaches to z = pane_depth_m."""
+    """An oven with its front at z = 0.5, and a pane in it whose face is at z = pane_depth_m."""
     body = box("body", np.array([1.0, 0.4, 0.2]), np.array([0.3, 0.4, 0.3]), 0)
     half = np.array([pane_half_m, pane_half_m, 0.02])
     pane = box("pane", np.array([1.0, 0.4, pane_depth_m - 0.02]), half, 1)
@@ -91,7 +91,7 @@ def test_a_part_that_shares_no_face_to_be_seen_stays(depth_m: float, half_m: flo
     assert with_parts_apart(source) == (source, 0)
 
 
-def test_three_pieces_in_one_plane_are_all_apart() -> None:
+def test_three_coplanar_pieces_are_all_moved_apart() -> None:
     pieces = [replace(_oven(0.3), id=name, name=name) for name in ("a", "b", "c")]
     after, n = with_parts_apart(house(pieces, [room("0_0", RECT)]))
     fronts = sorted(_front(item, 0) for item in after.items)
@@ -99,6 +99,6 @@ def test_three_pieces_in_one_plane_are_all_apart() -> None:
     assert np.diff(fronts).min() > 0.9 * MOVED_M
 
 
-def test_a_home_without_things_stays_as_it_is() -> None:
+def test_a_home_without_furniture_is_unchanged() -> None:
     source = house([*walls_around(RECT), *covers(room("0_0", RECT))], [room("0_0", RECT)])
     assert with_parts_apart(source) == (source, 0)

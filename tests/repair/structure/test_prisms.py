@@ -22,7 +22,7 @@ TAG = Tag(0, "side", 0)
         (RECTANGLE, [(0.0, 0.0), (0.05, 0.02), (0.02, 0.05)]),
         (DENTED, [(2.0, 1.0), (2.2, 1.5), (1.8, 1.5)]),
         (DENTED, [(2.0, 1.0), (2.002, 1.005), (1.998, 1.005)]),
-        # A sharp wedge between the rings: a small crumb would leave them touching.
+        # A sharp wedge between the rings: without a small crumb removed they would touch.
         (RECTANGLE, [(0.0, 0.0), (3.0, 0.06), (3.0, 1.0)]),
     ],
 )
@@ -39,12 +39,12 @@ def test_a_prism_whose_hole_touches_its_outline_keeps_volume_and_upright_sides(
     assert face_areas(corners)[(up > 1e-3) & (up < 0.999)].sum() < 1e-9
 
 
-def test_tiles_of_one_picture_each_are_one_part_and_a_turned_one_another() -> None:
+def test_tiles_of_one_picture_each_are_one_part_and_a_turned_one_is_separate() -> None:
     corners = np.array([[x, 0.0, z] for x in range(3) for z in (0.0, 1.0)], np.float64)
     positions = corners[[0, 2, 3, 1, 2, 4, 5, 3]]
     tile = np.array([[0, 0], [1, 0], [1, 1], [0, 1]], np.float64)
     faces = np.array([[0, 1, 2], [0, 2, 3], [4, 5, 6], [4, 6, 7]])
-    (one,) = uv_parts(positions, faces, np.concatenate([tile, tile]))
-    assert one.area.area == pytest.approx(2.0)
+    (single,) = uv_parts(positions, faces, np.concatenate([tile, tile]))
+    assert single.area.area == pytest.approx(2.0)
     turned = uv_parts(positions, faces, np.concatenate([tile, 1 - tile[:, ::-1]]))
     assert [part.area.area for part in turned] == pytest.approx([1.0, 1.0])

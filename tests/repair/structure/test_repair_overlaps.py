@@ -1,4 +1,4 @@
-"""Rooms whose outlines overlap, each with walls of its own (SUNCG): no wall is lost for it."""
+"""Rooms with overlapping outlines and separate walls (SUNCG) lose no wall."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def _repaired(source: House) -> tuple[House, RepairReport]:
 
 
 def bath_in_living() -> House:
-    """A bathroom inside the outline of a living room; each room brings its own four walls."""
+    """A bathroom inside the outline of a living room; each room has four separate walls."""
     a, b = room("0_0", LIVING), room("0_1", BATH)
     walls = _owned(walls_around(LIVING, "living", thickness=0.1), "0_0")
     walls += _owned(walls_around(BATH, "bath", thickness=0.1), "0_1")
@@ -43,7 +43,7 @@ def test_partitions_inside_another_rooms_outline_stay(angle: float) -> None:
     after, report = _repaired(turned(bath_in_living(), angle))
     assert report.structure.walls_lost == ()
     rows = {a.item_id: a for a in report.structure.areas}
-    # Two walls of the bathroom stand in the living room's outline: 3.2 x 2.5 m each.
+    # Two walls of the bathroom are inside the living room's outline: 3.2 x 2.5 m each.
     for name in ("bath0", "bath3"):
         assert rows[name].before_m2 == pytest.approx(3.2 * 2.5, abs=0.3)
         assert rows[name].after_m2 == pytest.approx(rows[name].before_m2, rel=0.02)
@@ -54,16 +54,16 @@ def test_partitions_inside_another_rooms_outline_stay(angle: float) -> None:
     assert "WALL LOST" not in summary_of_report(report)
 
 
-def test_the_smaller_room_sees_its_own_walls_and_the_larger_one_the_partitions() -> None:
+def test_the_smaller_room_sees_its_walls_and_the_larger_one_the_partitions() -> None:
     after, _ = _repaired(bath_in_living())
     assert {i for i, _ in seen_from(after, IN_BATH) if i.startswith("living")} == set()
-    seen = {i for i, _ in seen_from(after, IN_LIVING)}
-    assert {"bath0", "bath3", "living0", "living1", "living2", "living3"} <= seen
+    visible = {i for i, _ in seen_from(after, IN_LIVING)}
+    assert {"bath0", "bath3", "living0", "living1", "living2", "living3"} <= visible
     for origin in (IN_BATH, IN_LIVING):
         assert coinciding_share(after, origin) < 1e-3
 
 
-def test_neighbours_side_by_side_see_their_own_sides() -> None:
+def test_adjacent_rooms_see_their_sides_of_the_wall() -> None:
     # Both walls fill the slab between the rooms; one reaches 3 cm into the other room.
     left, right = (0.0, 0.0, 4.0, 3.0), (4.07, 0.0, 8.0, 3.0)
     a, b = room("0_0", left), room("0_1", right)
@@ -71,14 +71,14 @@ def test_neighbours_side_by_side_see_their_own_sides() -> None:
     walls += _owned(walls_around(right, "b", thickness=0.1), "0_1")
     after, report = _repaired(house([*walls, *covers(a), *covers(b)], [a, b]))
     assert report.structure.walls_lost == ()
-    for origin, own in (((2.0, 1.3, 1.5), "a"), ((6.0, 1.3, 1.5), "b")):
+    for origin, prefix in (((2.0, 1.3, 1.5), "a"), ((6.0, 1.3, 1.5), "b")):
         walls_seen = {i for i, _ in seen_from(after, origin) if not i.startswith(("floor", "ceil"))}
-        assert {i[0] for i in walls_seen} == {own}
+        assert {i[0] for i in walls_seen} == {prefix}
         assert coinciding_share(after, origin) < 1e-3
 
 
-def test_a_wall_half_in_another_room_keeps_the_half_that_stands_there() -> None:
-    # The long wall leaves the living room's edge and goes on through the middle of it.
+def test_a_wall_half_in_another_room_keeps_that_half() -> None:
+    # The long wall continues from the living room's edge through its middle.
     a, b = room("0_0", LIVING), room("0_1", (2.0, -3.0, 8.0, 0.0))
     corner = replace(a, polygon=np.array([[0, 0], [5, 0], [5, -2], [10, -2], [10, 6], [0, 6.0]]))
     long = wall("long", (2.0, -0.05), (8.0, -0.05), thickness=0.1)
@@ -90,19 +90,17 @@ def test_a_wall_half_in_another_room_keeps_the_half_that_stands_there() -> None:
     assert (high - low)[0] == pytest.approx(6.0, abs=0.01)
 
 
-def test_a_wall_that_is_lost_is_told_in_report_note_and_words(
-    monkeypatch: pytest.MonkeyPatch,
-) -> None:
+def test_a_lost_wall_is_in_report_note_and_summary(monkeypatch: pytest.MonkeyPatch) -> None:
     def whole_outline(walls, rooms, table):  # type: ignore[no-untyped-def]
-        """As repair once cut: with all of the other room."""
+        """The former behaviour of repair: cut with all of the other room."""
         areas = {r.id: plan_geometry.polygon_of_room(r.polygon) for r in rooms}
-        found = []
+        cut = []
         for w in walls:
-            others = [a for i, a in areas.items() if i != w.room_id]
+            other_outlines = [a for i, a in areas.items() if i != w.room_id]
             planes = level_plane(-0.05), level_plane(2.55)
-            cutters = solid_prisms(others, *planes, (w.tag("hidden"),) * 3, table)
-            found.append(replace(w, solid=subtract(w.solid, cutters)))
-        return found
+            cutters = solid_prisms(other_outlines, *planes, (w.tag("hidden"),) * 3, table)
+            cut.append(replace(w, solid=subtract(w.solid, cutters)))
+        return cut
 
     monkeypatch.setattr(watertight, "with_own_sides_visible", whole_outline)
     after, report = _repaired(bath_in_living())

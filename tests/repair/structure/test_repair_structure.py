@@ -1,4 +1,4 @@
-"""Walls, floors and ceilings of small houses after repair: solid, joined, nothing coincides."""
+"""Walls, floors and ceilings of small houses after repair: solid, joined, without coinciding faces."""
 
 from __future__ import annotations
 
@@ -63,17 +63,17 @@ def test_planar_walls_become_solids_of_ten_centimetres_away_from_the_room() -> N
     bounds = np.array([i.bounds for i in after.items if i.kind is ItemKind.WALL])
     assert bounds[:, 0].min(0)[[0, 2]] == pytest.approx([-0.1, -0.1], abs=1e-5)
     assert bounds[:, 1].max(0)[[0, 2]] == pytest.approx([4.1, 3.1], abs=1e-5)
-    # From outside, no way into the corner between two walls.
+    # From outside there is no gap in the corner between two walls.
     outside = seen_from(after, (-1.0, 1.3, -1.0))
     assert "joint" in {name for _, name in outside}
     assert {name for _, name in seen_from(after, MIDDLE)} == {"plane", "floor", "ceiling"}
 
 
-def test_a_wall_that_is_no_closed_solid_is_left_as_it_is_and_told() -> None:
+def test_an_open_wall_is_left_unchanged_with_a_note() -> None:
     r = room("0_0", RECT)
-    first, *others = walls_around(RECT)
+    first, *rest = walls_around(RECT)
     gap = replace(first, surfaces=first.surfaces[:-1])
-    after, report = _repaired(house([gap, *others, *covers(r)], [r]))
+    after, report = _repaired(house([gap, *rest, *covers(r)], [r]))
     assert [(x.what, x.id) for x in report.structure.left_as_is] == [("wall", "w0")]
     assert after.items[0].surfaces == gap.surfaces
 
@@ -87,7 +87,7 @@ def test_walls_drawn_twice_leave_one_face() -> None:
     assert _sky(report) == 0
 
 
-def test_neighbouring_slabs_show_each_room_its_own_floor() -> None:
+def test_adjacent_slabs_show_each_room_its_floor() -> None:
     a, b = room("0_0", RECT), room("0_1", (4.1, 0.0, 8.0, 3.0))
     walls = [
         *walls_around((0.0, 0.0, 8.0, 3.0)),
@@ -96,14 +96,14 @@ def test_neighbouring_slabs_show_each_room_its_own_floor() -> None:
     after, report = _repaired(house([*walls, *covers(a), *covers(b)], [a, b]))
     assert len(unpaired_edges(after)) == 0
     assert _sky(report) == 0
-    for origin, own in ((MIDDLE, "0_0"), ((6.0, 1.3, 1.5), "0_1")):
+    for origin, room_id in ((MIDDLE, "0_0"), ((6.0, 1.3, 1.5), "0_1")):
         lids_seen = {i for i, _ in seen_from(after, origin) if not i.startswith(("w", "between"))}
-        assert lids_seen == {f"floor_{own}", f"ceiling_{own}"}
+        assert lids_seen == {f"floor_{room_id}", f"ceiling_{room_id}"}
         assert coinciding_share(after, origin) < 1e-3  # fmt: skip
 
 
-def test_a_floor_whose_picture_ends_within_it_keeps_where_it_lies() -> None:
-    """Left of x = 2 the picture lies once a metre, right of it one texel goes on, as a wrap of clamp has it."""
+def test_a_floor_whose_picture_ends_within_it_keeps_its_mapping() -> None:
+    """Left of x = 2 the picture repeats each metre, right of it one texel continues, as a clamped wrap does."""
     r = room("0_0", RECT)
     floor, ceiling = covers(r)
     points = np.array([(x, 0.0, z) for x in (0.0, 2.0, 2.0, 4.0) for z in (0.0, 3.0)], np.float32)
@@ -116,9 +116,9 @@ def test_a_floor_whose_picture_ends_within_it_keeps_where_it_lies() -> None:
     drawn = replace(floor, surfaces=(sheet,))
     after, _ = _repaired(house([*walls_around(RECT), drawn, ceiling], [r]))
     assert len(unpaired_edges(after)) == 0
-    seen = [s for i in after.items if i.id == floor.id for s in i.surfaces if s.name == "floor"]
+    surfaces = [s for i in after.items if i.id == floor.id for s in i.surfaces if s.name == "floor"]
     area = {"left": 0.0, "right": 0.0}
-    for surface in seen:
+    for surface in surfaces:
         assert surface.uvs is not None
         for face in surface.faces:
             x, z = surface.positions[face][:, 0], surface.positions[face][:, 2]
@@ -133,7 +133,7 @@ def test_a_floor_whose_picture_ends_within_it_keeps_where_it_lies() -> None:
     assert area == pytest.approx({"left": 6.0, "right": 6.0}, rel=1e-3)
 
 
-def test_a_wall_whose_picture_ends_within_it_keeps_where_it_lies() -> None:
+def test_a_wall_whose_picture_ends_within_it_keeps_its_mapping() -> None:
     r = room("0_0", RECT)
     walls = planar_walls(RECT)
     drawn = next(w for w in walls if np.ptp(w.bounds[:, 2]) == 0 and w.bounds[0, 2] == 0)
@@ -148,8 +148,8 @@ def test_a_wall_whose_picture_ends_within_it_keeps_where_it_lies() -> None:
     after, report = _repaired(house([*walls, *covers(r)], [r]))
     assert len(unpaired_edges(after)) == 0
     assert _sky(report) == 0
-    seen = [s for i in after.items if i.id == drawn.id for s in i.surfaces if s.name == "plane"]
-    for surface in seen:
+    surfaces = [s for i in after.items if i.id == drawn.id for s in i.surfaces if s.name == "plane"]
+    for surface in surfaces:
         assert surface.uvs is not None
         corners, uv = surface.positions[surface.faces], surface.uvs[surface.faces]
         is_left = corners[..., 0].mean(1) < 2
@@ -157,10 +157,10 @@ def test_a_wall_whose_picture_ends_within_it_keeps_where_it_lies() -> None:
         assert (uv[~is_left] == 0.25).all()
         assert is_left.any()
         assert not is_left.all()
-    assert seen
+    assert surfaces
 
 
-def test_a_floor_goes_on_through_a_doorway() -> None:
+def test_a_floor_continues_through_a_doorway() -> None:
     a, b = room("0_0", RECT), room("0_1", (4.3, 0.0, 8.0, 3.0))
     walls = [
         *walls_around((0.0, 0.0, 8.0, 3.0)),
@@ -183,7 +183,7 @@ def test_a_floor_goes_on_through_a_doorway() -> None:
 
 
 def test_a_slab_never_sticks_into_a_neighbour_at_another_height() -> None:
-    # The second room's floor lies 4 cm lower, and a wall of 5 cm stands between.
+    # The second room's floor is 4 cm lower, behind a wall of 5 cm.
     a = room("0_0", RECT)
     b = room("0_1", (4.05, 0.0, 8.0, 3.0), floor_y=-0.04, ceiling_y=2.46)
     walls = [
@@ -192,9 +192,9 @@ def test_a_slab_never_sticks_into_a_neighbour_at_another_height() -> None:
     ]
     after, report = _repaired(house([*walls, *covers(a), *covers(b)], [a, b]))
     assert _sky(report) == 0
-    for origin, own in ((MIDDLE, "0_0"), ((6.0, 1.3, 1.5), "0_1")):
+    for origin, room_id in ((MIDDLE, "0_0"), ((6.0, 1.3, 1.5), "0_1")):
         lids_seen = {i for i, _ in seen_from(after, origin) if not i.startswith(("w", "between"))}
-        assert lids_seen == {f"floor_{own}", f"ceiling_{own}"}
+        assert lids_seen == {f"floor_{room_id}", f"ceiling_{room_id}"}
 
 
 def test_a_slab_of_an_upper_room_leaves_the_room_below_its_height() -> None:
@@ -210,7 +210,7 @@ def test_a_slab_of_an_upper_room_leaves_the_room_below_its_height() -> None:
 
 
 def test_a_stairwell_that_no_room_covers_gets_the_lid_it_lacks() -> None:
-    # Below a room of the whole plan; above it a room that leaves out the stairwell: x > 3.
+    # Below a room of the whole plan; above it a room that excludes the stairwell: x > 3.
     a = room("0_0", RECT)
     b = room("1_0", (0.0, 0.0, 3.0, 3.0), floor_y=2.6, ceiling_y=5.1)
     walls = [*walls_around(RECT), *walls_around(RECT, "up", bottom=2.5, top=5.1)]
@@ -284,7 +284,7 @@ def test_badly_drawn_rooms_are_tight_after_repair(
     thickness: float,
     lifts: tuple[float, float],
 ) -> None:
-    # Walls up to 4 cm from where they should stand, floor and ceiling, at any angle.
+    # Walls up to 4 cm from their exact place at floor and ceiling, at any angle.
     x0, z0, x1, z1 = RECT
     rect = (x0 - gaps[0], z0 - gaps[1], x1 + gaps[2], z1 + gaps[3])
     walls = walls_around(rect, thickness=thickness, bottom=lifts[0], top=2.5 - lifts[1])
@@ -299,7 +299,7 @@ def test_badly_drawn_rooms_are_tight_after_repair(
 
 
 def _shortened(source: Item, by_m: float) -> Item:
-    """The wall with both ends drawn back, so that it may miss its neighbours."""
+    """The wall with both ends shortened, so that it may miss its neighbours."""
     low, high = source.bounds
     axis = int(np.argmax((high - low)[[0, 2]])) * 2
     middle = 0.5 * (low[axis] + high[axis])
@@ -311,7 +311,7 @@ def _shortened(source: Item, by_m: float) -> Item:
     return replace(source, surfaces=tuple(surfaces))
 
 
-def test_a_gable_is_as_high_as_its_slopes_where_they_are() -> None:
+def test_a_gable_is_as_high_as_its_slopes() -> None:
     gable = np.array([(0, 0), (4, 0), (4, 1), (2, 3), (0, 1)], float)
     n = len(gable)
     points = np.array([(x, y, z) for z in (0.0, 0.3) for x, y in gable], np.float32)
@@ -323,7 +323,7 @@ def test_a_gable_is_as_high_as_its_slopes_where_they_are() -> None:
         faces += [(k, j, n + k), (j, n + j, n + k)]
     surface = Surface("left", points, np.array(faces, np.int32), 0)
     item = Item("gable", "gable", ItemKind.WALL, "0", (surface,))
-    walls, left = walls_from_house(house([item], [room("0_0", (0, 0, 4, 4))]), TagTable(), shapely.Polygon(), 0.2)  # fmt: skip
-    assert not left
+    walls, rest = walls_from_house(house([item], [room("0_0", (0, 0, 4, 4))]), TagTable(), shapely.Polygon(), 0.2)  # fmt: skip
+    assert not rest
     x = np.array([[0.0, 0.15], [1.0, 0.15], [2.0, 0.15], [3.5, 0.15]])
     assert walls[0].top_at(x) == pytest.approx([1.0, 2.0, 3.0, 1.5], abs=1e-5)

@@ -1,4 +1,4 @@
-"""Released SUNCG walls: solid already, cut already, and coinciding where two rooms meet."""
+"""Released SUNCG walls: already solid and cut, and coinciding where two rooms meet."""
 
 from __future__ import annotations
 
@@ -31,12 +31,13 @@ def test_released_walls_are_not_thickened_again(suncg: Repaired) -> None:
     assert high[0] - low[0] == pytest.approx(0.095, abs=1e-4)
 
 
-def test_each_room_sees_its_own_side_where_walls_coincide(suncg: Repaired) -> None:
+def test_each_room_sees_its_side_where_walls_coincide(suncg: Repaired) -> None:
     for origin, room, x in (((2.0, 1.3, 1.5), "0_0", "3"), ((5.0, 1.3, 0.8), "0_1", "0")):
-        seen = seen_from(suncg[0], origin)
-        # Outside faces are the neighbour's; only reveals of its slabs show, in the doorway.
-        assert not [key for key in seen if key[1].endswith(" out")]
-        assert seen[f"{room}w{x}", f"WallInside#{room}_{x} in"] > 500
+        n_hits = seen_from(suncg[0], origin)
+        # Outside faces belong to the neighbour; only reveals of its slabs are visible, in the
+        # doorway.
+        assert not [key for key in n_hits if key[1].endswith(" out")]
+        assert n_hits[f"{room}w{x}", f"WallInside#{room}_{x} in"] > 500
         assert coinciding_share(suncg[0], origin) < 1e-3
 
 
@@ -44,7 +45,7 @@ def test_windows_that_are_cut_already_stay_open_and_are_plugged_for_the_meter(
     suncg: Repaired,
 ) -> None:
     house, report = suncg
-    # The window of room 0_0 lets the sky in, yet the meter counts nothing.
+    # The window of room 0_0 is open to the sky, yet the meter counts no leak.
     assert seen_from(house, (2.0, 1.3, 1.5))["", ""] > 500
     assert report.leaks is not None
     assert [s.rooms for s in report.leaks.spaces] == [("0_0",)]

@@ -1,4 +1,4 @@
-"""A user's trajectory: read as TUM writes it, and rejected with file, row and reason."""
+"""A user's trajectory: read in TUM's format, and rejected with file, row and reason."""
 
 import codecs
 from pathlib import Path
@@ -44,7 +44,7 @@ def test_a_row_that_is_no_pose_is_rejected_with_its_line(row: str, reason: str) 
     assert "way.txt: line 2" in str(caught.value)
 
 
-def test_stamps_that_do_not_grow_are_shown_as_they_are_written() -> None:
+def test_decreasing_stamps_are_shown_in_their_written_form() -> None:
     rows = f"1305031102.2091 1 1.5 2 {ALONG_Z}\n1305031102.2091 1 1.5 2 {ALONG_Z}\n"
     with pytest.raises(BadInput, match=r"time 1305031102\.2091 is not after 1305031102\.2091 of"):
         poses_from_tum(rows, "way.txt")
@@ -60,7 +60,7 @@ def test_stamps_that_do_not_grow_are_shown_as_they_are_written() -> None:
         (("0", "9000"), (0.0, 9000.0)),
     ],
 )
-def test_the_unit_of_stamps_since_1970_is_known_by_their_size(
+def test_the_size_of_stamps_since_1970_gives_their_unit(
     stamps: tuple[str, str], expected: tuple[float, float]
 ) -> None:
     poses = poses_from_tum("".join(f"{t} 1 1.5 2 {ALONG_Z}\n" for t in stamps), "way.txt")
@@ -92,7 +92,7 @@ def test_a_file_without_a_row_is_rejected() -> None:
         poses_from_tum("# nothing\n", "way.txt")
 
 
-def test_an_eye_inside_a_wall_is_told_with_its_row_and_one_in_the_room_is_not() -> None:
+def test_an_eye_inside_a_wall_is_refused_with_its_row() -> None:
     house = room_house(shell(3, 3, wall=0.3), 3, 3)
     geometry = geometry_from_house(house)
     cast = Caster(geometry).first_hit

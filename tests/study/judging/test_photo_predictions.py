@@ -1,4 +1,4 @@
-"""Predictions of photographs: their size and orientation, what cannot be read, and the files."""
+"""Predictions of photographs: size and orientation, unreadable files, output files."""
 
 from __future__ import annotations
 
@@ -47,7 +47,7 @@ def jpeg(path: Path, colour: np.ndarray, orientation: int = 1) -> Path:
     return path
 
 
-def test_each_photograph_gets_a_prediction_of_its_own_size(run: Path, tmp_path: Path) -> None:
+def test_each_photograph_gets_a_prediction_of_its_size(run: Path, tmp_path: Path) -> None:
     rng = np.random.default_rng(0)
     sizes = {"wide": (60, 120), "tall": (130, 50), "same": (96, 128)}
     folder = tmp_path / "photographs"
@@ -68,7 +68,7 @@ def test_each_photograph_gets_a_prediction_of_its_own_size(run: Path, tmp_path: 
     assert (out / "index.html").read_text().count("data:image/jpeg") == 6
 
 
-def test_thirteen_classes_are_a_layer_and_names_of_their_own(tmp_path: Path) -> None:
+def test_thirteen_classes_have_a_separate_layer_and_names(tmp_path: Path) -> None:
     fill(FolderStore(tmp_path / "root"), {"home-0-00000000": 2}, (40, 32))
     words = ["train", "segmentation", str(tmp_path / "root"), "--out", str(tmp_path / "run")]
     assert main([*words, "--hold-out", "none", *TINY, "--set", "n_classes=13"]) == 0
@@ -111,7 +111,7 @@ def test_exif_orientations_are_undone_as_pillow_undoes_them(orientation: int) ->
     np.testing.assert_array_equal(upright(picture, orientation), expected)
 
 
-def test_a_file_that_is_no_picture_is_told_and_the_rest_goes_on(
+def test_a_file_that_is_no_picture_is_reported_and_the_others_are_predicted(
     run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     broken = tmp_path / "broken.png"
@@ -138,7 +138,7 @@ def test_a_photograph_keeps_its_proportions_in_the_network() -> None:
     assert network_size(7, 7, 32 * 32) == (32, 64)
 
 
-def test_onnx_says_what_the_run_says(run: Path, tmp_path: Path) -> None:
+def test_onnx_predicts_like_the_run(run: Path, tmp_path: Path) -> None:
     import onnxruntime
     import torch
 
@@ -156,7 +156,7 @@ def test_onnx_says_what_the_run_says(run: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(output, expected, atol=1e-4)
 
 
-def test_packed_weights_say_what_the_run_says_and_are_checked_by_their_sha256(
+def test_packed_weights_predict_like_the_run_and_are_checked_by_their_sha256(
     run: Path, tmp_path: Path
 ) -> None:
     from pbrs_farm.study.judging.evaluation import open_run
@@ -182,11 +182,11 @@ def test_packed_weights_say_what_the_run_says_and_are_checked_by_their_sha256(
         open_run(packed.root)
 
 
-def test_weights_that_start_from_a_run_name_it_and_whose_works_it_saw(
+def test_weights_that_start_from_a_run_name_it_and_its_training_works(
     run: Path, tmp_path: Path
 ) -> None:
     fill(FolderStore(tmp_path / "root"), {"home-7-00000000": 2}, (40, 32))
-    # As if that run had begun with weights that saw photographs.
+    # As if that run had started from weights trained on photographs.
     first = tmp_path / "first"
     shutil.copytree(run, first)
     record = json.loads((first / "run.json").read_text())
@@ -204,7 +204,7 @@ def test_weights_that_start_from_a_run_name_it_and_whose_works_it_saw(
     assert str(tmp_path) not in (packed / "run.json").read_text()
 
 
-def test_predict_without_a_photograph_says_how(
+def test_predict_without_a_photograph_explains_its_use(
     run: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     assert main(["predict", str(run), "--out", "nowhere"]) == 1

@@ -75,7 +75,7 @@ def test_without_a_pixel_there_is_no_score() -> None:
     assert math.isnan(AngularErrors().score().mean_deg)
 
 
-def test_small_errors_and_their_root_mean_square_are_told() -> None:
+def test_small_errors_and_their_root_mean_square_are_computed() -> None:
     angles = np.radians([0.0, 4.0, 6.0, 10.0])
     predicted = np.stack([np.sin(angles), np.zeros(4), np.cos(angles)], -1)[None]
     truth = np.broadcast_to([0.0, 0.0, 1.0], predicted.shape)

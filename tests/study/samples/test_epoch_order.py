@@ -49,7 +49,7 @@ def test_the_order_follows_from_seed_and_epoch():
     assert len({tuple(order(s, e)) for s in range(3) for e in range(3)}) == 9
 
 
-def test_a_reader_opens_its_own_shards_only():
+def test_a_reader_opens_only_its_shards():
     for part in range(4):
         order = shard_order([50] * 20, seed=1, epoch=0, part=part, n_parts=4)
         assert len(np.unique(order[:, 0])) <= 6

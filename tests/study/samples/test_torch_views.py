@@ -23,7 +23,7 @@ HOUSES = {f"home-{k}-00000000": 4 for k in range(6)}
 
 @pytest.fixture(scope="module")
 def places(tmp_path_factory: pytest.TempPathFactory) -> tuple[Path, Path]:
-    """A root of 24 views, and its shards of 5."""
+    """A root of 24 views, and its shards of 5 views."""
     folder = tmp_path_factory.mktemp("study")
     fill(FolderStore(folder / "root"), HOUSES)
     pack(open_views(folder / "root"), folder / "shards", Packing(modes=MODES, views_per_shard=5))
@@ -34,7 +34,7 @@ def ids_of(loader) -> list[list[str]]:
     return [batch["id"] for batch in loader]
 
 
-def test_tensors_have_the_types_that_training_wants(places):
+def test_tensors_have_the_types_that_training_needs(places):
     import torch
 
     from pbrs_farm.study.samples.stored_views import StoredViews
@@ -85,13 +85,13 @@ def loader_of(place: Path, workers: int, seed: int = 5, rank: int = 0, world: in
 
 @pytest.mark.parametrize("packed", [False, True])
 @pytest.mark.parametrize("workers", [0, 2])
-def test_a_loader_goes_on_where_its_state_says(places, packed, workers):
+def test_a_loader_resumes_from_its_state(places, packed, workers):
     place = places[packed]
     whole = loader_of(place, workers)
     batches = [*ids_of(whole), *ids_of(whole)]
     assert len(batches) == 2 * len(whole) == 16
     assert batches[:8] != batches[8:]
-    # Stop within the first and within the second epoch, and go on with a new loader.
+    # Stop within the first and within the second epoch, and resume with a new loader.
     for n_before in (3, 8, 11):
         first, before = loader_of(place, workers), []
         while len(before) < n_before:
@@ -108,7 +108,7 @@ def test_a_loader_goes_on_where_its_state_says(places, packed, workers):
 
 
 @pytest.mark.parametrize("packed", [False, True])
-def test_a_loop_that_asks_for_no_batch_beyond_the_length_gets_whole_epochs(places, packed):
+def test_a_loop_over_the_length_gets_whole_epochs(places, packed):
     whole, counted = loader_of(places[packed], 0), loader_of(places[packed], 0)
     batches = [*ids_of(whole), *ids_of(whole)]
     ids = []
@@ -174,7 +174,7 @@ def test_a_split_is_that_of_the_houses(places, tmp_path):
     assert len(views) == len(open_views(places[0]).only(split="train", shares=shares))
 
 
-def test_shards_need_torch_and_numpy_alone(places):
+def test_shards_need_only_torch_and_numpy(places):
     code = f"""
 import sys
 for name in ("pydantic", "OpenImageIO", "scipy", "pyarrow", "PIL", "obstore", "mitsuba", "rich", "shapely"):
@@ -188,7 +188,7 @@ print(sum(len(batch["id"]) for batch in loader))
     assert (done.stderr, done.stdout) == ("", "24\n")
 
 
-def test_evaluation_reads_every_view_once_whatever_the_workers(places):
+def test_evaluation_reads_every_view_once_for_any_workers(places):
     from torch.utils.data import DataLoader
 
     from pbrs_farm.study.samples.sharded_views import ShardedViews

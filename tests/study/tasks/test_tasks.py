@@ -19,7 +19,7 @@ pytestmark = pytest.mark.study
 
 
 def test_mirroring_keeps_a_normals_angle_to_its_ray() -> None:
-    """A pixel's ray and normal are mirrored together, so that their product stays."""
+    """A pixel's ray and normal are mirrored together, so that their product is unchanged."""
     task, plan = task_of("normals"), small_plan()
     batch = {k: torch.from_numpy(v) for k, v in views(2, plan).targets.items()}
     turned = task.mirrored(batch, torch.tensor([True, False]))
@@ -74,15 +74,15 @@ def test_depth_is_judged_up_to_a_scale_and_trained_halfway_so() -> None:
     assert error == pytest.approx(0, abs=1e-6)
     assert figures["abs_rel"] == pytest.approx(1)
     assert figures["below_1_25"] == 0
-    assert figures["rms_m"] == pytest.approx(np.sqrt(7))  # of 1, 2 and 4 metres too far
+    assert figures["rms_m"] == pytest.approx(np.sqrt(7))  # 1, 2 and 4 metres too far
     loss = task.loss(twice, {"depth": depth}, plan)
     torch.testing.assert_close(loss, torch.tensor([np.log(2) ** 2 / 2], dtype=torch.float32))
-    # One of two pixels at e times its depth: the logarithms spread by a half.
+    # One of two pixels at e times its depth: the logarithms differ by a half.
     half = np.array([[1.0, 2.0]], np.float32)
     assert scorer.add(half * [[1, np.e]], {"depth": half}) == pytest.approx(0.5)
 
 
-def test_the_mean_depth_is_one_of_logarithms_and_leaves_out_what_is_unknown() -> None:
+def test_the_mean_depth_is_one_of_logarithms_over_known_pixels() -> None:
     task, plan = task_of("depth"), small_plan("depth")
     depths = [np.array(row, np.float32) for row in ([[1, 0, 0]], [[4, 8, 0]])]
     name, baseline = task.baseline([{"depth": depth} for depth in depths], plan)
@@ -114,12 +114,12 @@ def test_the_truth_as_a_prediction_is_perfect(name: str) -> None:
     assert task.error(scorer.figures()) < 0.06
 
 
-def test_a_task_that_is_none_is_refused() -> None:
+def test_an_unknown_task_is_refused() -> None:
     with pytest.raises(BadInput, match="no such task"):
         task_of("albedo")
 
 
-def test_an_enlarged_picture_gives_a_map_of_its_own_size() -> None:
+def test_an_enlarged_picture_gives_a_map_of_its_size() -> None:
     plan = small_plan("boundaries", enlarge="2")
     network = network_of(plan.network, 1).eval()
     colour = torch.rand(1, 3, 32, 40)

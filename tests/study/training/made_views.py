@@ -1,4 +1,4 @@
-"""Views for training tests, built in code: colour says the normal, so that it can be learnt."""
+"""Views for training tests, built in code: the colour encodes the normal, so that it can be learnt."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ TINY = [
     for field in ("width_px=40", "height_px=32", "batch=2", "steps=3", "threads=1", "log_every=1")
     for word in ("--set", field)
 ]  # fmt: skip
-"""The same for three steps, as words of the command line."""
+"""The same plan with three steps, as words of the command line."""
 
 
 def small_plan(task: str = "normals", **changed: str) -> TrainingPlan:
-    """Plan tiny at 40x32 for six steps of two views."""
+    """A plan of size tiny at 40x32 for six steps of two views."""
     return plan_of(task, "tiny", SMALL | changed)
 
 
@@ -60,6 +60,6 @@ def sample(number: int, size: tuple[int, int] = (40, 32)) -> Sample:
 
 
 def views(n: int, plan: TrainingPlan) -> ViewArrays:
-    """n views as a plan's task wants them."""
+    """n views in the form that the plan's task needs."""
     size = (plan.width_px, plan.height_px)
     return arrays_of_samples((sample(k, size) for k in range(n)), task_of(plan.task), plan)

@@ -19,7 +19,7 @@ def _pixel(*rgb: float) -> torch.Tensor:
     return torch.tensor(rgb).view(1, 3, 1, 1)
 
 
-def test_grey_stays_grey_whatever_the_turn() -> None:
+def test_grey_stays_grey_for_any_turn() -> None:
     angles = torch.linspace(-pi, pi, 9)
     grey = torch.full((9, 3, 2, 2), 0.4)
     assert torch.allclose(rotate_hue(grey, angles), grey, atol=1e-6)
@@ -67,13 +67,13 @@ def test_a_turned_camera_sees_the_same_sphere_from_its_middle(pitch: float, roll
     new = rotate_cameras(old, task_of("normals"), torch.tensor([[pitch, roll]]), 60.0)
     valid = new["valid"][0]
     assert 0.6 < float(valid.float().mean()) < 1
-    # Every normal points at the camera, whichever way it looks: to a pixel, since labels are nearest.
+    # Every normal points at the camera in any direction; up to a pixel, since labels are nearest.
     difference = (new["normal"] - old["normal"])[0][valid].abs().max() / 32767
     assert float(difference) < 1.2 * 2 * np.tan(np.radians(30)) / 128
     assert not new["normal"][0][~valid].any()
 
 
-def test_a_camera_that_pitches_up_sees_what_is_above_and_rolls_clockwise() -> None:
+def test_a_camera_that_pitches_up_sees_higher_points_and_rolls_clockwise() -> None:
     old, task = sphere(), task_of("normals")
     up = rotate_cameras(old, task, torch.tensor([[0.2, 0.0]]), 60.0)["colour"][0, :, 48, 64]
     assert float(up[1]) == pytest.approx((1 - np.sin(0.2)) / 2, abs=0.01)

@@ -1,4 +1,4 @@
-"""Curves of a training in TensorBoard and W&B say what metrics.jsonl says."""
+"""TensorBoard's and W&B's curves of a training equal metrics.jsonl."""
 
 from __future__ import annotations
 
@@ -43,7 +43,7 @@ def test_wandb_keeps_a_run_offline(tmp_path: Path, monkeypatch: pytest.MonkeyPat
         observe({"step": 2, "train_error": 30.0})
     (file,) = (tmp_path / "run").rglob("*.wandb")
     words = (b"loss", b"0.25", b"train_error", b"steps")
-    # W&B's own process writes the file out after the run has ended.
+    # W&B's process writes the file after the run has ended.
     until = time.monotonic() + 30
     while not all(word in file.read_bytes() for word in words) and time.monotonic() < until:
         time.sleep(0.1)

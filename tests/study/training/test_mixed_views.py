@@ -1,4 +1,4 @@
-"""A share of each batch from photographs, training on photographs alone, and what may judge them."""
+"""A share of each batch from photographs, training only on photographs, and valid judges."""
 
 from __future__ import annotations
 
@@ -62,12 +62,12 @@ def test_each_set_has_its_share_of_the_batches() -> None:
     assert all(len(ids) == 8 for ids in batches)
     counts = Counter(id.partition("/")[0] for ids in batches for id in ids)
     assert counts == {"x": 80, "y": 32, "home": 208}
-    # Every photograph is taken equally often, but for the last round.
+    # Every photograph is used equally often, except in the last round.
     taken = Counter(id for ids in batches for id in ids if id.startswith("x"))
     assert set(taken.values()) <= {26, 27}
 
 
-def test_a_step_takes_the_same_whatever_was_before_and_processes_share_it() -> None:
+def test_a_steps_views_do_not_depend_on_earlier_steps_and_processes_share_them() -> None:
     whole = _ids(_mixed(), range(12))
     assert _ids(_mixed(), range(5, 12)) == whole[5:]
     halves = [_ids(_mixed(), range(12), slice(rank, None, 2)) for rank in range(2)]
@@ -101,7 +101,7 @@ def test_streamed_views_are_mixed_as_those_in_memory(root: Path, sequences: Path
         assert all(np.array_equal(arrays[name], expected[name]) for name in arrays)
 
 
-def test_a_run_with_photographs_says_so_and_they_may_not_judge(
+def test_a_run_with_photographs_records_them_and_they_may_not_judge(
     root: Path, sequences: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "run"
@@ -112,7 +112,7 @@ def test_a_run_with_photographs_says_so_and_they_may_not_judge(
     assert len(record["photographs"][0]["pictures"]) == 4
     assert record["views"]["train"] == 6
     assert "planes fitted to depth" in record["truth"]
-    # The same files elsewhere are the same photographs.
+    # The same files in another folder are the same photographs.
     (tmp_path / "moved").mkdir()
     sequences.rename(tmp_path / "moved/elsewhere")
     assert main(["evaluate", str(out), "--on", str(tmp_path / "moved")]) != 0
@@ -123,7 +123,7 @@ def test_a_run_with_photographs_says_so_and_they_may_not_judge(
     assert str(tmp_path) not in card
 
 
-def test_photographs_train_alone_and_scenes_are_held_out(
+def test_photographs_train_without_views_and_scenes_are_held_out(
     sequences: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     out = tmp_path / "run"
@@ -133,7 +133,7 @@ def test_photographs_train_alone_and_scenes_are_held_out(
     assert record["views"] == {"train": 2, "held_out": 3}
     assert record["homes"] == {"train": ["a"], "held_out": ["b"]}
     assert record["mode"] == "photographs"
-    # They are judged, and a run is tuned on them from another.
+    # They judge a run, and a run is tuned on others.
     tuned = tmp_path / "tuned"
     words = ["train", "normals", str(sequences), "--out", str(tuned), "--init", str(out)]
     assert main([*words, "--hold-out", "b", *TINY, "--set", "steps=1"]) == 0
@@ -144,9 +144,9 @@ def test_photographs_train_alone_and_scenes_are_held_out(
     assert "all its scenes are held out" in capsys.readouterr().err
 
 
-def test_labels_of_scannet_train_beside_views(root: Path, tmp_path: Path) -> None:
+def test_labels_of_scannet_train_with_views(root: Path, tmp_path: Path) -> None:
     write_scene(tmp_path / "scans/s0", "intrinsics_depth.txt")
-    # A scene without labels has nothing to say of classes.
+    # A scene without labels cannot judge classes.
     write_scene(tmp_path / "scans/s1", "intrinsics_depth.txt", label=False)
     plan = small_plan("segmentation", batch="4")
     source = TrainingSource((str(root),), hold_out=frozenset(), mix=(Mix(str(tmp_path / "scans"), 0.25),))  # fmt: skip
@@ -176,7 +176,7 @@ def test_shares_leave_something_to_the_views(root: Path, sequences: Path) -> Non
         training_views(TrainingSource((str(root),), mix=mix), small_plan())
 
 
-def test_a_run_starts_from_the_packages_weights_or_says_that_they_do_not_fit(
+def test_a_run_starts_from_the_packages_weights_or_reports_a_mismatch(
     root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     words = ["train", "normals", str(root), "--hold-out", "none", "--init", "shipped", *TINY]
@@ -184,7 +184,7 @@ def test_a_run_starts_from_the_packages_weights_or_says_that_they_do_not_fit(
     assert main([*words, "--plan", "lite", "--set", "rate=0", "--out", str(out)]) == 0
     shipped = Path(json.loads((out / "run.json").read_text())["init"])
     tensors = [read_tensors(RunFolder(folder).weights)[0] for folder in (out, shipped)]
-    # At a rate of 0 the weights are those that ship, in full floats.
+    # At a rate of 0 the weights are the shipped ones, in full floats.
     name = "model.encoder.stem.0.weight"
     assert torch.equal(tensors[0][name], tensors[1][name].float())
     capsys.readouterr()

@@ -1,4 +1,4 @@
-"""Rays as an input of networks: those of the lens, after any augmentation."""
+"""Rays as an input of networks follow the lens, also after augmentation."""
 
 from __future__ import annotations
 
@@ -58,7 +58,7 @@ def test_places_and_rays_go_there_and_back_beyond_the_picture_too() -> None:
 
 
 def sphere() -> dict[str, torch.Tensor]:
-    """Amid a sphere each normal points back along its pixel's ray, whatever camera looks."""
+    """Inside a sphere each normal points back along its pixel's ray, for any camera."""
     rays = rays_of_cameras(CAMERAS, HEIGHT, WIDTH)
     directions = ray_channels(rays)
     normal = (-directions.permute(0, 2, 3, 1) * 32767).round().to(torch.int16)
@@ -97,7 +97,7 @@ def test_rays_stay_those_of_the_pixels_under_every_change(
     valid = new["valid"]
     assert float(valid.float().mean()) > 0.5
     off = torch.linalg.norm(normal - channels, dim=-1)[valid]
-    # Labels are the nearest pixel's each time: off by its half diagonal at most.
+    # Labels are the nearest pixel's each time: wrong by half its diagonal at most.
     n_times = len(changed.keys() - {"flip"})
     assert float(off.max()) < max(0.8 * n_times, 0.01) / 110
 
@@ -140,7 +140,7 @@ def test_every_kind_of_network_sees_its_rays(name: str) -> None:
     assert (inputs.grad.abs().amax((0, 2, 3)) > 0).all()
 
 
-def test_imagenets_start_asks_nothing_of_rays_at_first(
+def test_imagenets_start_ignores_rays_at_first(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     state = write_lite_package(tmp_path)
@@ -162,7 +162,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return out
 
 
-def test_a_run_with_rays_needs_cameras_and_its_card_says_so(run: Path) -> None:
+def test_a_run_with_rays_needs_cameras_and_its_card_states_it(run: Path) -> None:
     trained = open_run(run)
     assert trained.plan.rays
     colour = np.zeros((1, 32, 40, 3), np.uint8)
@@ -180,7 +180,7 @@ def photograph(path: Path, focal_35mm: int = 0) -> None:
     Image.fromarray(colour).save(path, "JPEG", exif=exif)
 
 
-def test_a_photographs_lens_is_told_or_found_or_assumed_and_its_row_says_which(
+def test_a_photographs_lens_is_given_found_or_assumed_and_its_row_records_it(
     run: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     places = {name: tmp_path / "photos" / name for name in ("bare", "exif", "beside")}
@@ -200,7 +200,7 @@ def test_a_photographs_lens_is_told_or_found_or_assumed_and_its_row_says_which(
     rows_of_run = rows()
     assert rows_of_run["bare"] == (60.0, "assumed")
     assert rows_of_run["beside"] == (90.0, "intrinsics")
-    # 36 mm of film 43.27 mm across, of a picture 150 pixels across and 120 wide.
+    # 36 mm of film 43.27 mm across, in a picture 150 pixels across and 120 wide.
     f = 36 / np.hypot(36, 24) * 150
     assert rows_of_run["exif"] == (round(float(np.degrees(2 * np.arctan(60 / f))), 1), "EXIF")
     assert "bare_normal.png: " in (text := capsys.readouterr().out)
@@ -218,7 +218,7 @@ def test_a_network_without_rays_takes_no_field_of_view(
     assert "--hfov: 60: this network does not use rays" in capsys.readouterr().err
 
 
-def test_another_lens_changes_what_a_run_says(run: Path) -> None:
+def test_another_lens_changes_a_runs_predictions(run: Path) -> None:
     trained = open_run(run)
     colour = np.random.default_rng(0).integers(0, 256, (1, 32, 40, 3)).astype(np.uint8)
     f = 20 / tan(np.radians(30))

@@ -1,4 +1,4 @@
-"""Two processes of torchrun share each batch; the first alone writes the run."""
+"""Two processes of torchrun share each batch; only the first writes the run."""
 
 from __future__ import annotations
 

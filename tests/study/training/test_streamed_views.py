@@ -1,4 +1,4 @@
-"""Views read anew for each step train as those in memory do, from a root and from shards."""
+"""Views read again for each step train like those in memory, from a root and from shards."""
 
 from __future__ import annotations
 
@@ -65,7 +65,7 @@ def test_a_root_streamed_trains_to_the_weights_of_memory(
     assert figures[0] == figures[1]
 
 
-def test_shards_streamed_go_on_to_the_same_weights_with_other_workers(
+def test_streamed_shards_resume_to_the_same_weights_with_other_workers(
     root: Path, tmp_path: Path
 ) -> None:
     packing = Packing(modes=MODES, views_per_shard=2)

@@ -25,7 +25,7 @@ def some_tensors() -> dict[str, torch.Tensor]:
     }
 
 
-def test_what_is_written_is_read(tmp_path: Path) -> None:
+def test_written_tensors_are_read_back(tmp_path: Path) -> None:
     tensors, path = some_tensors(), tmp_path / "x.safetensors"
     write_tensor_file(path, tensors, {"position": "there"})
     tensors_read, words = read_tensor_file(path)

@@ -59,7 +59,7 @@ def test_plan_lite_trains_every_task(task: str, tmp_path: Path) -> None:
 
 
 @pytest.mark.parametrize("task", ["normals", "boundaries", "mean"])
-def test_a_killed_run_goes_on_to_the_same_weights(task: str, tmp_path: Path) -> None:
+def test_a_killed_run_resumes_to_the_same_weights(task: str, tmp_path: Path) -> None:
     plan = killed_plan(task)
     train(Job(plan, tmp_path / "whole", seed=3), views(5, plan))
     words = [sys.executable, "-c", _KILLED, str(tmp_path / "killed"), task]
@@ -80,7 +80,7 @@ def test_a_killed_run_goes_on_to_the_same_weights(task: str, tmp_path: Path) -> 
     assert finished_run(folder.root)[1]["state"] == "finished"
 
 
-def test_the_weights_are_those_that_the_judge_who_chooses_liked_best(tmp_path: Path) -> None:
+def test_the_weights_are_those_of_the_best_validation(tmp_path: Path) -> None:
     plan = small_plan(steps="4", judge_every="1")
     weights: list[dict[str, torch.Tensor]] = []
 
@@ -121,7 +121,7 @@ def test_a_running_mean_of_weights_is_judged_kept_and_gone_on_with(tmp_path: Pat
 
 
 @pytest.mark.parametrize("slow", ["float32", "bfloat16"])
-def test_bfloat16_is_taken_where_its_step_is_faster_and_a_run_keeps_it(
+def test_bfloat16_is_used_if_its_step_is_faster_and_a_run_keeps_it(
     slow: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     plan = small_plan(steps="1", bf16="true")
@@ -134,7 +134,7 @@ def test_bfloat16_is_taken_where_its_step_is_faster_and_a_run_keeps_it(
     train(Job(plan, tmp_path), views(2, plan))
 
 
-def test_measuring_a_step_leaves_the_network_as_it_is() -> None:
+def test_measuring_a_step_leaves_the_network_unchanged() -> None:
     plan = small_plan()
     network = torch.nn.Conv2d(3, 3, 1)
     before = network.weight.clone()
@@ -189,13 +189,13 @@ def test_another_network_does_not_start_from_a_run_it_shares_nothing_with(tmp_pa
 
 
 @pytest.mark.skipif(torch.cuda.is_available(), reason="says what happens without a GPU")
-def test_a_plan_for_a_gpu_says_that_there_is_none(tmp_path: Path) -> None:
+def test_a_plan_for_a_gpu_reports_that_there_is_none(tmp_path: Path) -> None:
     with pytest.raises(MachineFailed, match="asks for a GPU"):
         train(Job(small_plan(device="cuda"), tmp_path), views(3, small_plan()))
     assert not (tmp_path / "run.json").exists()
 
 
-def test_a_damaged_checkpoint_is_one_line(tmp_path: Path) -> None:
+def test_a_damaged_checkpoint_is_refused(tmp_path: Path) -> None:
     (tmp_path / "checkpoint.safetensors").write_bytes(b"not a checkpoint")
     plan = small_plan(steps="2")
     with pytest.raises(BadInput, match="not a checkpoint"):
@@ -209,7 +209,7 @@ def test_every_view_is_taken_once_a_round() -> None:
     for k in range(3):
         assert sorted(rows[7 * k : 7 * k + 7]) == list(range(7))
     assert not np.array_equal(rows[:7], rows[7:14])
-    # A run that goes on at the fifth step takes the same views.
+    # A run resumed at the fifth step uses the same views.
     assert np.array_equal(BatchOrder(7, 3, seed=5).rows(4), rows[12:15])
 
 
@@ -221,7 +221,7 @@ def test_views_of_shards_come_from_four_shards_at_a_time() -> None:
         assert sorted(rows) == list(range(120))
         windows = [set(groups[rows[40 * i : 40 * i + 40]]) for i in range(3)]
         assert [len(window) for window in windows] == [4, 4, 4]
-        # Within them the shards are mixed.
+        # Shards are mixed within them.
         assert len(set(groups[rows[:10]])) > 1
     assert not np.array_equal(*rounds)
 
@@ -245,14 +245,14 @@ def test_errors_on_training_and_held_out_views_are_drawn(tmp_path: Path) -> None
     picture = (tmp_path / "a" / "curves.svg").read_text()
     assert picture.count("<polyline") == 3
     assert "mean angle, degrees" in picture
-    # Looking changes nothing: the same weights as without.
+    # Validation changes nothing: the weights equal those of a run without it.
     blind = small_plan()
     train(Job(blind, tmp_path / "b"), views(4, plan), views(2, plan))
     judged, unseen = (read_tensors(RunFolder(tmp_path / x).weights)[0] for x in "ab")
     assert all(torch.equal(judged[name], unseen[name]) for name in judged)
 
 
-def test_a_run_of_before_a_field_was_there_goes_on(tmp_path: Path) -> None:
+def test_a_run_older_than_a_field_is_resumed(tmp_path: Path) -> None:
     plan = small_plan(steps="2", hue="0")
     first = train(Job(plan, tmp_path), views(3, plan))
     record = RunFolder(tmp_path).record()
@@ -270,7 +270,7 @@ def test_a_run_of_before_a_field_was_there_goes_on(tmp_path: Path) -> None:
     assert train(Job(plan, tmp_path), views(3, plan))["network"] == first["network"]
 
 
-def test_a_place_that_is_no_folder_is_one_line(tmp_path: Path) -> None:
+def test_a_place_that_is_no_folder_is_refused(tmp_path: Path) -> None:
     (tmp_path / "file").write_text("here")
     plan = small_plan(steps="2")
     for out in (tmp_path / "file", tmp_path / "file" / "run"):
@@ -301,7 +301,7 @@ def test_a_plans_fields_are_set_and_checked() -> None:
         plan_of("normals", "huge")
 
 
-def test_training_needs_torch_and_numpy_alone(tmp_path: Path) -> None:
+def test_training_needs_only_torch_and_numpy(tmp_path: Path) -> None:
     words = [sys.executable, "-c", _ALONE, str(tmp_path)]
     done = subprocess.run(words, capture_output=True, text=True, timeout=120)
     assert done.returncode == 0, done.stderr

@@ -1,4 +1,4 @@
-"""A sensor counts electrons, keeps to its limits, and gives equal bits for equal seeds."""
+"""A sensor counts electrons, has limits, and gives equal bits for equal seeds."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ from pbrs_farm.transport.develop.camera_sensor import (
 )
 
 PLAIN = SensorFields(is_on=True)
-PLAIN_TONE = ToneFields(contrast=1.0, flare=0.0)  # noise is of the straight part
+PLAIN_TONE = ToneFields(contrast=1.0, flare=0.0)  # measures noise in the linear part
 ONES = np.ones(3, np.float32)
 
 
@@ -32,8 +32,8 @@ def grey(level: float, size: int = 64) -> np.ndarray:
 def test_a_mosaic_of_a_grey_ramp_comes_back_as_it_was() -> None:
     ramp = np.repeat(np.linspace(0.1, 0.9, 32)[None, :, None], 32, axis=0)
     rgb = np.repeat(ramp, 3, axis=2)
-    found = demosaic(mosaic(rgb))
-    assert np.abs(found - rgb)[4:-4, 4:-4].max() < 1e-9
+    restored = demosaic(mosaic(rgb))
+    assert np.abs(restored - rgb)[4:-4, 4:-4].max() < 1e-9
 
 
 def test_a_flat_colour_survives_the_mosaic() -> None:
@@ -75,7 +75,7 @@ def test_the_shutter_opens_first_and_then_the_speed_rises_up_to_its_limit() -> N
     assert dark.factor < 1e6
 
 
-def test_a_stop_more_doubles_the_exposure_and_a_smaller_pupil_asks_for_more_time() -> None:
+def test_a_stop_more_doubles_the_exposure_and_a_smaller_pupil_needs_more_time() -> None:
     more = PLAIN.model_copy(update={"compensation_ev": 1.0})
     assert choose_exposure(0.05, more).factor == pytest.approx(0.1)
     narrow = PLAIN.model_copy(update={"f_number": 4.0})
@@ -85,32 +85,32 @@ def test_a_stop_more_doubles_the_exposure_and_a_smaller_pupil_asks_for_more_time
 
 def test_automatic_exposure_makes_up_63_percent_of_a_step_after_its_lag() -> None:
     times = np.linspace(0, 0.5, 51)
-    wanted = [1.0, *[math.e] * 50]
-    assert math.log(lag_exposure(wanted, times.tolist(), 0.5)) == pytest.approx(1 - 1 / math.e)
-    assert lag_exposure(wanted, times.tolist(), 0.0) == math.e
+    levels = [1.0, *[math.e] * 50]
+    assert math.log(lag_exposure(levels, times.tolist(), 0.5)) == pytest.approx(1 - 1 / math.e)
+    assert lag_exposure(levels, times.tolist(), 0.0) == math.e
     assert lag_exposure([2.0], [0.0], 0.5) == pytest.approx(2.0)
 
 
-def test_saturated_light_is_white_whatever_the_gains() -> None:
+def test_saturated_light_is_white_for_any_gains() -> None:
     gains = np.array([0.7, 1.0, 1.8], np.float32)
     picture = take_by_sensor(grey(1e4), gains, Exposure(0.01, 100, 1.0), PLAIN, PLAIN_TONE, seed=3)
     assert (picture[4:-4, 4:-4] >= 254).all()
 
 
 def test_corners_are_darker_by_the_vignetting_and_the_middle_is_not() -> None:
-    found = apply_lens(np.ones((101, 101, 3)), PLAIN.model_copy(update={"vignetting": 0.4}))
-    assert found[50, 50, 0] == pytest.approx(1, abs=1e-3)
-    assert found[0, 0, 0] == pytest.approx(0.6, abs=0.01)
+    vignetted = apply_lens(np.ones((101, 101, 3)), PLAIN.model_copy(update={"vignetting": 0.4}))
+    assert vignetted[50, 50, 0] == pytest.approx(1, abs=1e-3)
+    assert vignetted[0, 0, 0] == pytest.approx(0.6, abs=0.01)
 
 
 def test_aberration_parts_red_from_blue_at_the_edge_and_not_in_the_middle() -> None:
     light = np.zeros((65, 640, 3))
     light[:, 320:328] = light[:, 600:608] = 1.0
-    found = apply_lens(light, PLAIN.model_copy(update={"aberration_px": 2.0}))
+    shifted = apply_lens(light, PLAIN.model_copy(update={"aberration_px": 2.0}))
     columns = np.arange(640)
 
     def centre(channel: int, at: slice) -> float:
-        row = found[32, at, channel]
+        row = shifted[32, at, channel]
         return float((row * columns[at]).sum() / row.sum())
 
     edge, middle = slice(580, 640), slice(300, 350)
@@ -139,15 +139,15 @@ def test_a_sensor_changes_develop() -> None:
 
 
 def test_dark_pixels_are_right_in_the_mean_above_a_black_level() -> None:
-    # Two electrons of light under twelve of read noise.
+    # Two electrons of light below twelve of read noise.
     fields = PLAIN.model_copy(update={"read_noise_e": 12.0, "full_well_e": 1000.0, "headroom": 1.0})
     light = np.full((256, 256), 2 / 1000)
-    kept, cut = (
+    with_offset, cut = (
         electrons_read(
             light, 100.0, fields.model_copy(update={"black_level": b}), np.random.default_rng(1)
         )
         for b in (1 / 16, 0.0)
     )
-    assert kept.mean() == pytest.approx(2 / 1000, abs=2e-4)
+    assert with_offset.mean() == pytest.approx(2 / 1000, abs=2e-4)
     assert cut.mean() > 5 / 1000
-    assert kept.min() < 0
+    assert with_offset.min() < 0

@@ -50,9 +50,9 @@ def test_one_denoiser_serves_all_pictures_of_a_process(monkeypatch: pytest.Monke
         raise AssertionError("another device")
 
     monkeypatch.setattr(pyoidn.Device, "__init__", refuse)
-    other = denoise_radiance(noisy[:32, :32], np.full((32, 32, 3), 0.5, np.float32), up[:32, :32])
-    assert other.shape == (32, 32, 3)
-    # After a picture of another size the first one is the same bits again.
+    smaller = denoise_radiance(noisy[:32, :32], np.full((32, 32, 3), 0.5, np.float32), up[:32, :32])
+    assert smaller.shape == (32, 32, 3)
+    # After a picture of another size the first one still gets the same bits.
     np.testing.assert_array_equal(first, denoise_radiance(noisy, np.full_like(noisy, 0.5), up))
 
 
@@ -71,7 +71,7 @@ assert torch.__file__.startswith(sys.argv[1])
 """
     path = os.pathsep.join([str(tmp_path), *filter(None, sys.path)])
     command = [sys.executable, "-c", script, str(tmp_path)]
-    found = subprocess.run(
+    imported = subprocess.run(
         command, env=os.environ | {"PYTHONPATH": path}, capture_output=True, text=True, check=False
     )
-    assert found.returncode == 0, found.stderr
+    assert imported.returncode == 0, imported.stderr

@@ -47,7 +47,7 @@ def test_tone_rises_with_radiance_and_never_wraps() -> None:
         assert values[-1] >= 250
 
 
-def test_the_curve_is_straight_below_its_shoulder_and_goes_on_without_a_step() -> None:
+def test_the_curve_is_straight_below_its_shoulder_and_continuous() -> None:
     rng = np.random.default_rng(0)
     dim = rng.uniform(0, 0.6, (16, 16, 3))
     np.testing.assert_array_equal(roll_off(dim, 64.0), dim)
@@ -76,7 +76,7 @@ def test_a_window_keeps_its_steps_up_to_the_white_of_the_recipe() -> None:
 
 def test_contrast_keeps_black_middle_and_white_and_is_its_slope_there() -> None:
     ramp = (np.arange(256) / 255)[None, :, None].repeat(3, -1)
-    # Above the shoulder the ramp is rolled off: look at what lies below.
+    # Above the shoulder the ramp is rolled off: compare below it.
     linear = np.where(ramp > 0.04045, ((ramp + 0.055) / 1.055) ** 2.4, ramp / 12.92)
     values = encode_tone(linear, ToneFields(contrast=2.0), 1.0)[0, :, 0].astype(int)
     assert (values[0], values[255]) == (0, 255)
@@ -85,7 +85,7 @@ def test_contrast_keeps_black_middle_and_white_and_is_its_slope_there() -> None:
     assert (np.diff(values) >= 0).all()
 
 
-def test_the_veil_lifts_black_and_one_bulb_does_not_fill_the_room_with_it() -> None:
+def test_the_veil_lifts_black_but_one_bulb_does_not_fill_the_room() -> None:
     room = grey(1.0)
     room[:8] = 1e-6
     bulb = room.copy()
@@ -104,15 +104,15 @@ def test_local_contrast_brings_shade_and_sun_together_keeps_detail_and_makes_no_
     light[:, 48:] *= 8
     flat = flatten_light(light, ToneFields(local_contrast=0.5))
     sides = flat[:, :40].mean(), flat[:, 56:].mean()
-    assert 2 < sides[1] / sides[0] < 4  # of 8
+    assert 2 < sides[1] / sides[0] < 4  # 8 before
     ripple = (flat / light)[32, 10:30, 0]
-    assert ripple.max() / ripple.min() < 1.1  # detail as it was
-    # Beside the edge no pixel is brighter or darker than its side by more than its own detail.
+    assert ripple.max() / ripple.min() < 1.1  # detail is unchanged
+    # Next to the edge no pixel is brighter or darker than its side by more than its detail.
     assert flat[:, 40:48].min() > 0.8 * flat[:, :40].min()
     assert flat[:, 48:56].max() < 1.2 * flat[:, 56:].max()
 
 
-def test_sharpening_acts_at_edges_alone() -> None:
+def test_sharpening_changes_only_edges() -> None:
     light = np.full((16, 16, 3), 0.1)
     light[:, 8:] = 0.3
     plain, sharp = (
@@ -145,18 +145,18 @@ def test_the_neutral_camera_is_the_same_for_each_view_and_others_err() -> None:
     assert all(c.tone.local_contrast == 0.4 for c in cameras)
 
 
-def test_what_the_recipe_sets_is_kept_whatever_the_camera() -> None:
+def test_values_of_the_recipe_are_used_for_every_camera() -> None:
     words = {"tone.camera": "phone", "tone.sharpening": "0.1", "sensor.preset": "webcam"}
     camera = recipe_from_name("fast", words).camera_of("h", "0_0_1")
     assert (camera.tone.sharpening, camera.sensor.preset) == (0.1, "webcam")
     words = {"tone.camera": "phone", "sensor.jpeg_quality": "50", "sensor.lag_s": "0.3"}
-    own, phone = (
+    fixed, phone = (
         recipe_from_name("fast", words).camera_of("h", "0_0_1").sensor,
         SENSOR_PRESETS["phone"],
     )
-    assert (own.jpeg_quality, own.lag_s) == (50, 0.3)
-    assert own.is_on
-    assert own.full_well_e == phone["full_well_e"]
+    assert (fixed.jpeg_quality, fixed.lag_s) == (50, 0.3)
+    assert fixed.is_on
+    assert fixed.full_well_e == phone["full_well_e"]
 
 
 def test_drawn_cameras_are_of_all_kinds_and_of_a_variant_another_each() -> None:
@@ -180,8 +180,10 @@ def test_frames_of_a_clip_and_all_cameras_of_a_rig_have_one_camera() -> None:
     for first in ("0_1_2", "frame_00004"):
         of_rig = {three.camera_of("h", f"{first}{eye}") for eye in ("", "_back", "_far_back")}
         assert of_rig == {recipe.camera_of("h", first)}
-    others = {recipe.camera_of(h, v) for h in "gh" for v in ("0_1_2", "0_1_3", "0_1_4", "0_1_5")}
-    assert len(others) > 4
+    rig_cameras = {
+        recipe.camera_of(h, v) for h in "gh" for v in ("0_1_2", "0_1_3", "0_1_4", "0_1_5")
+    }
+    assert len(rig_cameras) > 4
 
 
 def test_glare_spreads_light_and_neither_adds_nor_takes_any() -> None:
@@ -226,8 +228,8 @@ def test_a_panorama_denoises_alike_wherever_it_is_cut() -> None:
 
     def cleaned(shift: int, *, wraps: bool) -> np.ndarray:
         rolled = np.roll(noisy, shift, axis=1)
-        found = denoise_aovs(LinearAovs(rolled, rolled * 0, white, normal), wraps=wraps)
-        return np.roll(found.outdoor, -shift, axis=1)
+        clean = denoise_aovs(LinearAovs(rolled, rolled * 0, white, normal), wraps=wraps)
+        return np.roll(clean.outdoor, -shift, axis=1)
 
     def seam(wraps: bool) -> float:
         cut, whole = cleaned(0, wraps=wraps), cleaned(64, wraps=wraps)
@@ -241,12 +243,12 @@ def test_noise_does_not_brighten_the_exposure_that_earlier_frames_ask_for() -> N
     noisy = rng.gamma(0.3, 1 / 0.3, (24, 32, 1)).repeat(3, -1).astype(np.float32)
     normal = np.zeros((24, 32, 3), np.float32)
     normal[..., 2] = 1
-    asked = {
+    exposures = {
         (name, denoise): wanted_exposures(
             LinearAovs(light, light * 0, normal * 0 + 0.5, normal), ToneFields(), denoise=denoise
         )["mlt_ol"]
         for name, light in (("noisy", noisy), ("clean", noisy * 0 + 1))
         for denoise in (True, False)
     }
-    assert abs(asked["noisy", True] / asked["clean", False] - 1) < 0.2
-    assert asked["noisy", False] / asked["clean", False] > 1.3
+    assert abs(exposures["noisy", True] / exposures["clean", False] - 1) < 0.2
+    assert exposures["noisy", False] / exposures["clean", False] > 1.3

@@ -1,4 +1,4 @@
-"""The white balance where one colour fills the view."""
+"""The white balance of views filled by one colour."""
 
 from __future__ import annotations
 
@@ -17,11 +17,11 @@ def view(albedo: np.ndarray, light: np.ndarray) -> tuple[np.ndarray, np.ndarray]
     return (picture * light * level).astype(np.float32), picture
 
 
-def test_a_room_of_one_strong_colour_turns_the_sky_no_complement() -> None:
-    radiance, albedo = view(PINK, PINK / PINK.max())  # light that the walls reflected at each other
+def test_a_room_of_one_strong_colour_leaves_the_sky_its_hue() -> None:
+    radiance, albedo = view(PINK, PINK / PINK.max())  # light interreflected by the walls
     gains = white_balance(radiance, albedo, ToneFields(white_balance=0.7))
     sky = np.array([0.8, 0.95, 1.1]) * gains
-    assert sky[1] < 1.05 * max(sky[0], sky[2])  # green does not lead: no mint
+    assert sky[1] < 1.05 * max(sky[0], sky[2])  # green does not dominate
     assert gains.max() / gains.min() < 3
 
 

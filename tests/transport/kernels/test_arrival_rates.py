@@ -1,4 +1,4 @@
-"""Shadow rays by how often such rays arrive: what is counted, what follows, and that no mean moves."""
+"""Shadow-ray rates from arrival counts: counting, sharing between voxels, and unbiased pictures."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ SKY = sunsky(RECIPE, elevation_rad=0.6, azimuth_rad=0.35)
 
 
 def three_lamps() -> tuple[House, Camera]:
-    """A room with an open side and two bulbs, and a third bulb in a closed box that hides it."""
+    """A room with an open side and two bulbs, and a third bulb hidden in a closed box."""
     surfaces = rooms.shell((4.0, 2.5, 4.0), 0, front=False)
     surfaces.append(rooms.box((2.9, 0.0, 2.9), (3.7, 0.8, 3.7), 0))
     lamps = [
@@ -40,8 +40,8 @@ def three_lamps() -> tuple[House, Camera]:
 
 
 @pytest.fixture
-def tried(monkeypatch: pytest.MonkeyPatch) -> tuple[LightScene, Camera]:
-    """The room, where even a small view has a trial."""
+def trial_scene(monkeypatch: pytest.MonkeyPatch) -> tuple[LightScene, Camera]:
+    """The room, with trials enabled for small views."""
     from pbrs_farm.transport import pilot
 
     monkeypatch.setattr(pilot, "MIN_SAMPLES", 0)
@@ -58,13 +58,11 @@ def traced(scene: LightScene, emitters: Any, camera: Camera, weights: Any, seed:
 
 
 def plain_half(lanes: Any) -> Any:
-    """The picture without guided rays, of the two that a trial sums."""
+    """The unguided picture of the two that a trial sums."""
     return lanes[: 32 * 24].reshape(24, 32, 3)
 
 
-def test_a_voxel_has_its_own_rate_where_rays_were_cast_and_else_that_around_it_or_the_views() -> (
-    None
-):
+def test_a_voxels_rate_comes_from_its_rays_else_its_neighbours_or_the_view() -> None:
     from pbrs_farm.transport.kernels.arrival_rates import N_KINDS, arrival_rates
     from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
 
@@ -90,36 +88,38 @@ def test_a_voxel_counts_with_the_26_around_it() -> None:
     assert counted[0, 0, 0] == counted[3, 2, 4] == 8
     assert counted[0, 1, 2] == 18
     assert counted[1, 1, 1] == 27
-    one = np.zeros((4, 3, 5, 1), np.uint32)
-    one[3, 1, 2] = 7
-    near = grid.with_neighbours(one.reshape(-1, 1)).reshape(4, 3, 5)
+    counts = np.zeros((4, 3, 5, 1), np.uint32)
+    counts[3, 1, 2] = 7
+    near = grid.with_neighbours(counts.reshape(-1, 1)).reshape(4, 3, 5)
     assert (near[2:, :, 1:4] == 7).all()
     assert near.sum() == 7 * 18
 
 
 @pytest.mark.long
 def test_a_trial_finds_that_no_ray_to_a_hidden_lamp_arrives(
-    tried: tuple[LightScene, Camera],
+    trial_scene: tuple[LightScene, Camera],
 ) -> None:
     from pbrs_farm.transport.kernels.arrival_rates import FIRST_LAMP, FIRST_SUNLIT
 
-    scene, camera = tried
+    scene, camera = trial_scene
     emitters, weights = scene.emitters(camera, FIELDS, 1)
     counts = traced(scene, emitters, camera, replace(weights, arrival_rates=None), 2).arrivals
     cast, arrived = counts.sum(1)
     slot = np.argsort(-weights.lamps, kind="stable")
     hidden = FIRST_LAMP + int(np.flatnonzero(slot == 2)[0])
-    seen = FIRST_LAMP + int(np.flatnonzero(slot == 0)[0])
+    hidden_lamp = FIRST_LAMP + int(np.flatnonzero(slot == 0)[0])
     assert cast[hidden] > 100
     assert arrived[hidden] < 0.02 * cast[hidden]
-    assert arrived[seen] > 0.95 * cast[seen]  # no ray goes to the half that is turned away
-    # What the room has not: an outdoor technique or a lamp beyond the third.
+    assert (
+        arrived[hidden_lamp] > 0.95 * cast[hidden_lamp]
+    )  # no ray is cast to the far half of the lamp
+    # Absent from the room: an outdoor technique or a lamp beyond the third.
     assert not cast[FIRST_LAMP + 3 : FIRST_SUNLIT].any()
     assert (arrived <= cast).all()
 
 
-def test_rates_let_more_of_fewer_shadow_rays_arrive(tried: tuple[LightScene, Camera]) -> None:
-    scene, camera = tried
+def test_rates_let_more_of_fewer_shadow_rays_arrive(trial_scene: tuple[LightScene, Camera]) -> None:
+    scene, camera = trial_scene
     emitters, weights = scene.emitters(camera, FIELDS, 1)
     assert weights.arrival_rates is not None
     (cast, arrived), (cast_all, arrived_all) = (
@@ -132,29 +132,30 @@ def test_rates_let_more_of_fewer_shadow_rays_arrive(tried: tuple[LightScene, Cam
 
 @pytest.mark.long
 @pytest.mark.parametrize("are_random", [False, True])
-def test_rates_leave_the_mean_alone(tried: tuple[LightScene, Camera], are_random: bool) -> None:
+def test_rates_keep_the_mean(trial_scene: tuple[LightScene, Camera], are_random: bool) -> None:
     # Significance: 16 blocks of two groups, |z| < 4.5 each is missed by chance once in 4500 runs.
-    # Random rates are wrong everywhere: chances and pdfs must agree whatever the rates are.
-    scene, camera = tried
+    # Random rates are wrong everywhere: probabilities and pdfs must agree for any rates.
+    scene, camera = trial_scene
     emitters, weights = scene.emitters(camera, FIELDS, 1)
     rates = weights.arrival_rates
     assert rates is not None
     if are_random:
         rates = np.random.default_rng(5).uniform(0.02, 1, rates.shape)
-    found: list[list[list[Any]]] = []
+    measured: list[list[list[Any]]] = []
     for by_place, first_seed in ((rates, 10), (None, 20)):
-        own = replace(weights, arrival_rates=by_place)
+        random_rates = replace(weights, arrival_rates=by_place)
         sums = [
-            traced(scene, emitters, camera, own, seed) for seed in range(first_seed, first_seed + 8)
+            traced(scene, emitters, camera, random_rates, seed)
+            for seed in range(first_seed, first_seed + 8)
         ]
         pairs = [[s.outdoor for s in sums], [s.indoor for s in sums]]
-        found.append([[blocks(plain_half(x)) for x in pictures] for pictures in pairs])
-    for with_rates, without in zip(*found, strict=True):
+        measured.append([[blocks(plain_half(x)) for x in pictures] for pictures in pairs])
+    for with_rates, without in zip(*measured, strict=True):
         assert np.abs(z_scores(with_rates, without)).max() < 4.5
 
 
-def test_a_tried_view_has_the_same_bits_again(tried: tuple[LightScene, Camera]) -> None:
-    scene, camera = tried
+def test_a_tried_view_has_the_same_bits_again(trial_scene: tuple[LightScene, Camera]) -> None:
+    scene, camera = trial_scene
     fields = FIELDS.model_copy(update={"spp": 8})
     first, again = (
         LightScene.load(three_lamps()[0], {}, RECIPE, SKY).render(camera, "-", fields, 3)
@@ -165,7 +166,7 @@ def test_a_tried_view_has_the_same_bits_again(tried: tuple[LightScene, Camera]) 
     assert scene.emitters(camera, fields, 3)[1].arrival_rates is not None
 
 
-def test_metropolis_has_no_rates(tried: tuple[LightScene, Camera]) -> None:
-    scene, camera = tried
+def test_metropolis_has_no_rates(trial_scene: tuple[LightScene, Camera]) -> None:
+    scene, camera = trial_scene
     chains = FIELDS.model_copy(update={"integrator": "metropolis"})
     assert scene.emitters(camera, chains, 1)[1].arrival_rates is None

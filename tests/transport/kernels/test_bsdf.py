@@ -1,4 +1,4 @@
-"""The reflectance model: reciprocal, energy conserving, sampled with the pdf it names."""
+"""The reflectance model is reciprocal, conserves energy and is sampled with its stated pdf."""
 
 from __future__ import annotations
 
@@ -71,7 +71,7 @@ def test_samples_follow_the_pdf_they_name(model: tuple[float, ...], theta: float
     uniform = mi.warp.square_to_uniform_sphere(uniform_pairs(8 * N, 5))
     _value, pdf = evaluate_bsdf(m, wi, uniform)
     weight = pdf.numpy().astype(np.float64) * 4 * np.pi
-    # A coat's sample below the horizon is no direction: pdf 0, light lost.
+    # A coat's sample below the horizon is discarded: pdf 0, light lost.
     is_real = evaluate_bsdf(m, wi, drawn)[1].numpy() > 0
     d, u = drawn.numpy(), uniform.numpy()
     for axis, power in itertools.product(range(3), (1, 2)):
@@ -104,8 +104,8 @@ def test_a_wall_of_glass_takes_as_much_light_as_the_way_through_it_is_long(cos: 
     mi = mitsuba()
     from pbrs_farm.transport.kernels.bsdf import thin_glass_transmittance
 
-    left = thin_glass_transmittance(mi.Color3f(0.9, 1.0, 0.5), mi.Float(cos)).numpy().ravel()
-    np.testing.assert_allclose(left, np.array([0.9, 1.0, 0.5]) ** (1 / abs(cos)), rtol=1e-4)
+    transmitted = thin_glass_transmittance(mi.Color3f(0.9, 1.0, 0.5), mi.Float(cos)).numpy().ravel()
+    np.testing.assert_allclose(transmitted, np.array([0.9, 1.0, 0.5]) ** (1 / abs(cos)), rtol=1e-4)
 
 
 def test_pairs_of_sobol_numbers_fill_every_cell_once() -> None:

@@ -1,4 +1,4 @@
-"""Rays of the path tracer find the first surface, through which of Embree's tests ever."""
+"""Rays of the path tracer find the first surface with each of Embree's intersection tests."""
 
 from __future__ import annotations
 
@@ -29,8 +29,8 @@ def tables() -> SceneTables:
     return LightScene.load(house, {}, RECIPE, dark_sky()).tables
 
 
-def faces_met(scene: Any, tables: SceneTables) -> NDArray[np.int64]:
-    """(N_RAYS,) faces that rays from the middle of the room meet, -1 = none."""
+def faces_hit(scene: Any, tables: SceneTables) -> NDArray[np.int64]:
+    """(N_RAYS,) faces hit by rays from the middle of the room, -1 = none."""
     import drjit as dr
     import mitsuba as mi
 
@@ -51,22 +51,22 @@ def test_the_faster_test_finds_the_same_faces(
     fast = device_scene.DeviceScene(tables)
     monkeypatch.setattr(device_scene, f"MAX_FAST_{limit}", len(getattr(tables, counted)) - 1)
     plain = device_scene.DeviceScene(tables)
-    found = faces_met(fast, tables)
-    assert (fast._fast is None, plain._fast is None) == (False, True)
-    assert (found >= 0).mean() > 0.9
-    assert (found == faces_met(plain, tables)).mean() > 0.9999
+    hit_faces = faces_hit(fast, tables)
+    assert (fast.fast is None, plain.fast is None) == (False, True)
+    assert (hit_faces >= 0).mean() > 0.9
+    assert (hit_faces == faces_hit(plain, tables)).mean() > 0.9999
 
 
 def test_a_ray_that_slips_out_through_the_faster_test_is_traced_again(tables: SceneTables) -> None:
-    # A tree without the faces that most rays meet stands for one with gaps along its edges.
+    # Without the most-hit faces the tree stands in for one with gaps along its edges.
     import mitsuba as mi
 
     from pbrs_farm.transport.kernels.device_scene import DeviceScene
 
     scene = DeviceScene(tables)
-    before = faces_met(scene, tables)
+    before = faces_hit(scene, tables)
     last = np.bincount(before[before >= 0]).argmax()
-    scene._fast = scene_from_mesh(mi, tables.positions, tables.faces[:last], watertight=False)
-    after = faces_met(scene, tables)
+    scene.fast = scene_from_mesh(mi, tables.positions, tables.faces[:last], watertight=False)
+    after = faces_hit(scene, tables)
     assert ((before == last) & (after == last)).any()
     assert ((after >= 0) == (before >= 0)).all()

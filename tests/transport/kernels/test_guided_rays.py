@@ -1,4 +1,4 @@
-"""Guided rays: they change no mean, cut the noise, and aim at what shines in a lamp's light."""
+"""Guided rays keep the mean, reduce the noise, and aim at surfaces lit by a lamp."""
 
 from __future__ import annotations
 
@@ -44,10 +44,10 @@ def unguided(monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize(
     "room", [hard_rooms.open_shade, pytest.param(hard_rooms.covered_cup, marks=pytest.mark.slow)]
 )
-def test_guided_rays_leave_the_mean_alone_and_cut_the_noise(
+def test_guided_rays_keep_the_mean_and_reduce_the_noise(
     room: Callable[[], tuple[House, Camera]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # 16 blocks, |z| < 4.5, and the whole picture, known to two hundredths, |z| < 3.5.
+    # 16 blocks, |z| < 4.5, and the whole picture, with an error of two hundredths, |z| < 3.5.
     scene, camera = loaded(room())
 
     def rendered() -> list[LightResult]:
@@ -66,7 +66,7 @@ def test_guided_rays_leave_the_mean_alone_and_cut_the_noise(
     assert variances[0] < 0.25 * variances[1]
 
 
-def test_an_unguided_view_is_as_one_without_guiding(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_an_unguided_view_equals_one_without_guiding(monkeypatch: pytest.MonkeyPatch) -> None:
     scene, camera = loaded(hard_rooms.open_shade())
     fields = FIELDS.model_copy(update={"spp": 16})
     plain = "pbrs_farm.transport.view_emitters.trial_weights"
@@ -83,7 +83,7 @@ def test_an_unguided_view_is_as_one_without_guiding(monkeypatch: pytest.MonkeyPa
 @pytest.mark.parametrize(
     ("room", "pays"), [(hard_rooms.open_shade, True), (lambda: rooms.window_room(lumen=800), False)]
 )
-def test_rays_are_guided_where_a_shade_hides_the_bulb_and_not_where_nothing_does(
+def test_rays_are_guided_only_if_a_shade_hides_the_bulb(
     room: Callable[[], tuple[House, Camera]], pays: bool
 ) -> None:
     scene, camera = loaded(room())
@@ -118,8 +118,8 @@ def test_a_small_view_is_guided_without_a_trial() -> None:
 
 @pytest.mark.slow
 def test_small_faces_far_from_the_origin_lose_no_light() -> None:
-    # Where float32 is coarse a ray starts a millimetre off its surface: it must still meet the
-    # face it was aimed at, or that light is lost (2 % of it, once).
+    # In coarse float32 a ray starts a millimetre off its surface: it must still hit the face it was
+    # aimed at, or that light is lost (2 % once).
     means = []
     for far_m, n in ((0.0, 32), (40.0, 512)):
         scene, camera = loaded(hard_rooms.open_shade(n=n, east=far_m))
@@ -180,7 +180,7 @@ def test_a_bare_bulb_in_a_room_has_nothing_to_aim_at() -> None:
     assert targets.shares.tolist() == [0]
 
 
-def test_a_lamp_is_chosen_as_often_as_its_pdf_says() -> None:
+def test_a_lamp_is_chosen_with_its_stated_probability() -> None:
     import drjit as dr
     import mitsuba as mi
 
@@ -196,8 +196,8 @@ def test_a_lamp_is_chosen_as_often_as_its_pdf_says() -> None:
     assert near.reference.total.numpy()[0] > 0
     uv = mi.Point2f(rng.next_float32(), rng.next_float32())
     to = emitters.sample_lamp(scene.device_scene, near, rng.next_float32(), uv, counted, on)
-    # With the pdfs of all right, the mean of 1 / pdf is the solid angle of all lamps,
-    # each a disc as wide as its bulb.
+    # If all pdfs are right, the mean of 1 / pdf is the solid angle of all lamps, each a disc as
+    # wide as its bulb.
     inverse = dr.select(to.valid, dr.rcp(to.pdf), 0).numpy()
     area_over_d2 = sum(
         float(lamp.area_m2) / 4 / ((1 + k - 1.3) ** 2 + 1.5**2)
@@ -207,7 +207,7 @@ def test_a_lamp_is_chosen_as_often_as_its_pdf_says() -> None:
 
 
 @pytest.mark.long
-def test_each_vertex_and_each_glass_has_random_numbers_of_its_own() -> None:
+def test_each_vertex_and_each_glass_has_separate_random_numbers() -> None:
     import mitsuba as mi
 
     from pbrs_farm.transport.kernels.camera_rays import device_camera
@@ -226,24 +226,24 @@ def test_each_vertex_and_each_glass_has_random_numbers_of_its_own() -> None:
     house = rooms.house([floor, *sheets], [rooms.matte("floor", 0.5), glass])
     scene, camera = loaded((house, view))
     emitters, _weights = scene.emitters(camera, FIELDS, 0)
-    asked: list[set[int]] = []
+    streams: list[set[int]] = []
 
     class Recorded:
         def get_1d(self, dim: Any) -> Any:
-            asked[-1].add(int(mi.UInt32(dim).numpy()[0]))
+            streams[-1].add(int(mi.UInt32(dim).numpy()[0]))
             return mi.Float(0.99)
 
         def get_2d(self, dim: Any) -> Any:
-            asked[-1].update({int(mi.UInt32(dim).numpy()[0]), int(mi.UInt32(dim).numpy()[0]) + 1})
+            streams[-1].update({int(mi.UInt32(dim).numpy()[0]), int(mi.UInt32(dim).numpy()[0]) + 1})
             return mi.Point2f(0.3, 0.6)
 
-    every = EmitterFilter(mi.Int32(-1), mi.Int32(-1))
-    context = PathContext(scene.device_scene, emitters, device_fields(FIELDS), every)
+    all_emitters = EmitterFilter(mi.Int32(-1), mi.Int32(-1))
+    context = PathContext(scene.device_scene, emitters, device_fields(FIELDS), all_emitters)
     path = camera_path(device_camera(camera), mi.Point2f(16, 12), mi.Point2f(0))
     for _step in range(3):
-        asked.append(set())
+        streams.append(set())
         path, result, _alive = advance(context, Recorded(), path, mi.Bool(True))
         assert result.si.valid.numpy()[0]
-    assert not asked[0] & asked[1]
-    assert not asked[1] & asked[2]
-    assert not asked[0] & asked[2]
+    assert not streams[0] & streams[1]
+    assert not streams[1] & streams[2]
+    assert not streams[0] & streams[2]

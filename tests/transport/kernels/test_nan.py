@@ -1,4 +1,4 @@
-"""A NaN never becomes an index: of a voxel, of a cell of the sun's plane or by a random number."""
+"""A NaN never becomes an index: of a voxel, of a cell of the sun's plane, or from a random number."""
 
 from __future__ import annotations
 
@@ -29,7 +29,7 @@ def test_a_point_that_is_nan_gets_a_voxel_of_the_grid() -> None:
 
     grid = VoxelGrid(np.array([[0, 0, 0], [3, 3, 3]], np.float32))
     points = mi.Point3f([_NAN, 9, 9], [9, _NAN, 9], [9, 9, _NAN])
-    # A NaN coordinate counts as the lowest one.
+    # A NaN coordinate counts as the lowest coordinate.
     width = round(grid.n_voxels ** (1 / 3))
     expected = [(width**3 - 1) - (width - 1) * stride for stride in (width**2, width, 1)]
     assert grid.voxel(points).numpy().tolist() == expected

@@ -1,4 +1,4 @@
-"""The choice of outdoor techniques by place: its grid, its weights, and that it changes no mean."""
+"""The choice of outdoor techniques by place: grid, weights, and unbiased pictures."""
 
 from __future__ import annotations
 
@@ -32,11 +32,11 @@ def test_voxels_are_half_a_metre(
     from pbrs_farm.transport.kernels.voxel_grid import voxel_grid
 
     corners = np.add([np.zeros(3), size], (1, 2, 3)).astype(np.float32)
-    low, found, found_edge = voxel_grid(corners)
-    assert (tuple(low), tuple(found), found_edge) == ((1, 2, 3), shape, edge)
+    low, grid_shape, found_edge = voxel_grid(corners)
+    assert (tuple(low), tuple(grid_shape), found_edge) == ((1, 2, 3), shape, edge)
 
 
-def test_a_vast_home_has_no_more_voxels_than_fit() -> None:
+def test_a_vast_home_has_at_most_the_fitting_voxels() -> None:
     from pbrs_farm.transport.kernels.voxel_grid import voxel_grid
 
     _low, shape, edge = voxel_grid(np.float32([(0, 0, 0), (900, 30, 700)]))
@@ -46,7 +46,7 @@ def test_a_vast_home_has_no_more_voxels_than_fit() -> None:
 
 @pytest.mark.long
 def test_a_corner_that_is_nowhere_has_no_voxel() -> None:
-    # Both a face that is left out of the light and corners of no face.
+    # A face excluded from the light, and corners of no face.
     surfaces = rooms.shell((4.0, 2.5, 4.0), 0, front=False)
     box = rooms.box((1.5, 0.0, 2.2), (2.5, 0.6, 2.9), 0)
     corners = np.float32([*box.positions, (np.nan, 0, 0), (np.inf, 0, 1), (0, 1, 0)])
@@ -60,7 +60,7 @@ def test_a_corner_that_is_nowhere_has_no_voxel() -> None:
     assert result.outdoor.mean() > 0
 
 
-def test_a_voxel_has_more_of_what_lights_it_and_something_of_everything() -> None:
+def test_a_voxel_prefers_the_techniques_that_light_it_and_keeps_all() -> None:
     from pbrs_farm.transport.kernels.outdoor_choice import MAX_TECHNIQUES, weights_by_place
     from pbrs_farm.transport.kernels.voxel_grid import VoxelGrid
 
@@ -74,16 +74,16 @@ def test_a_voxel_has_more_of_what_lights_it_and_something_of_everything() -> Non
     assert np.allclose(rows.sum(1), 1)
     assert rows[0, 1] > 0.7
     assert rows[3, 2] > 0.7
-    # Where no vertex was, those around tell; where none is around, the view's own weights hold.
+    # Voxels without vertices use their neighbours, and isolated ones the view's weights.
     assert rows[1, 1] > 0.6
     assert rows[2, 2] > 0.6
     assert np.allclose(rows[5:], weights, atol=1e-5)
-    # Nowhere is a technique forgotten.
+    # Every technique keeps a minimum weight everywhere.
     assert (rows >= 0.19 * weights).all()
 
 
-def test_a_dim_sky_is_chosen_as_a_bright_one() -> None:
-    # A hundred-thousandth of the light, and none of it is rounded away.
+def test_a_dim_sky_is_chosen_like_a_bright_one() -> None:
+    # A hundred-thousandth of the light, with no part rounded away.
     house, camera = rooms.window_room(0.7)
     rows = []
     for scale in (1.0, 1e-5):
@@ -96,7 +96,7 @@ def test_a_dim_sky_is_chosen_as_a_bright_one() -> None:
 
 
 @pytest.mark.long
-def test_weights_by_place_leave_the_mean_alone_and_cut_the_noise(
+def test_weights_by_place_keep_the_mean_and_reduce_the_noise(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # Significance: 16 blocks, |z| < 4.5 each is missed by chance once in 9000 runs.
@@ -133,7 +133,7 @@ def test_a_home_of_another_size_is_traced_by_the_same_kernel() -> None:
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
             scene.render(camera, "-", FIELDS.model_copy(update={"spp": 1}), 2)
             kernels = dr.kernel_history([dr.KernelType.JIT])
-        # One of paths, one of rays from the sun; the others are copies of a few operations.
+        # One of paths and one of sun rays; the others are copies of a few operations.
         traced.append({k["hash"] for k in kernels if k["operation_count"] > 1000})
     assert len(traced[0]) == 2
     assert all(kernels == traced[0] for kernels in traced)

@@ -1,4 +1,4 @@
-"""Roulette of shadow rays: when a ray is cast, and that what is seen stays the same."""
+"""Russian roulette of shadow rays: survival probability, and unbiased pictures."""
 
 from __future__ import annotations
 
@@ -31,7 +31,7 @@ def scene_and_camera(room: Callable[[], tuple[House, Camera]]) -> tuple[LightSce
     return LightScene.load(house, {}, RECIPE, SKY), camera.with_size(32, 24)
 
 
-def test_a_ray_is_cast_by_what_it_is_expected_to_bring_and_one_in_ten_at_least() -> None:
+def test_a_ray_survives_by_its_expected_contribution_and_at_least_one_in_ten() -> None:
     import drjit as dr
     import mitsuba as mi
 
@@ -44,9 +44,9 @@ def test_a_ray_is_cast_by_what_it_is_expected_to_bring_and_one_in_ten_at_least()
         (0.0, 0.001, 1.0, 1.0),
         (2.0, 8.0, 1.0, 1.0),
         (2.0, 1.0, 1.0, 0.25),
-        (2.0, 2.0, 0.5, 0.25),  # half of such rays arrive
+        (2.0, 2.0, 0.5, 0.25),  # half of these rays arrive
         (2.0, 0.004, 1.0, 0.1),
-        (2.0, float("nan"), 1.0, 1.0),  # counted, not hidden
+        (2.0, float("nan"), 1.0, 1.0),  # counted, so that it is not hidden
     ):
         roulette = ShadowRoulette(throughput, mi.Float(threshold), u)
         is_cast, chance = roulette.cast_by_chance(mi.Color3f(brings), mi.Float(rate))
@@ -58,28 +58,28 @@ def test_a_ray_is_cast_by_what_it_is_expected_to_bring_and_one_in_ten_at_least()
 @pytest.mark.parametrize(
     "room", [lambda: rooms.window_room(0.7, lumen=800), hard_rooms.covered_cup], ids=["sun", "cup"]
 )
-def test_roulette_of_shadow_rays_leaves_the_mean_alone(
+def test_roulette_of_shadow_rays_keeps_the_mean(
     room: Callable[[], tuple[House, Camera]], monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    # Ten times the usual threshold: nearly every ray is cast by chance. Significance: 16 blocks of
-    # each group, |z| < 4.5 each is missed by chance once in 4500 runs.
+    # Ten times the usual threshold: nearly every ray is subject to roulette. Significance: 16
+    # blocks of each group, |z| < 4.5 each is missed by chance once in 4500 runs.
     from pbrs_farm.transport import pilot
 
     scene, camera = scene_and_camera(room)
-    found: dict[float, list[list[np.ndarray]]] = {}
+    block_means: dict[float, list[list[np.ndarray]]] = {}
     for factor, first_seed in ((0.0, 10), (10.0, 20)):
         monkeypatch.setattr(pilot, "SHADOW_SHARE", factor * pilot.SHADOW_SHARE)
-        seeds = range(first_seed, first_seed + 6)  # not those of the others: independent pictures
+        seeds = range(first_seed, first_seed + 6)  # disjoint seeds for independent pictures
         results = [scene.render(camera, "-", FIELDS, seed) for seed in seeds]
         monkeypatch.undo()
-        found[factor] = [[blocks(r.group(g)) for r in results] for g in Group]
-    for without, by_chance in zip(found[0.0], found[10.0], strict=True):
+        block_means[factor] = [[blocks(r.group(g)) for r in results] for g in Group]
+    for without, by_chance in zip(block_means[0.0], block_means[10.0], strict=True):
         if np.any(without):
             assert not np.array_equal(without, by_chance)
             assert np.abs(z_scores(without, by_chance)).max() < 4.5
 
 
-def test_thresholds_are_those_of_each_groups_light_and_none_for_metropolis() -> None:
+def test_thresholds_follow_each_groups_light_and_metropolis_has_none() -> None:
     scene, camera = scene_and_camera(lambda: rooms.window_room(0.7, lumen=800))
     _emitters, weights = scene.emitters(camera, FIELDS, 1)
     result = scene.render(camera, "-", FIELDS, 1)

@@ -1,4 +1,4 @@
-"""Sunlit points: the light they bring is the light that paths find by chance, with less noise."""
+"""Sunlit points give the same light as paths that find it by chance, with less noise."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ FIELDS: LightFields = RECIPE.light.model_copy(update={"filter": "box", "spp": 64
 def sunny(
     house: House, *, azimuth_rad: float = 0.35, textures: dict[str, np.ndarray] | None = None
 ) -> LightScene:
-    """The scene of a house whose sun stands before its window, 29 degrees high."""
+    """The scene of a house with the sun in front of its window, 29 degrees high."""
     sky = sunsky(RECIPE, elevation_rad=0.5, azimuth_rad=azimuth_rad)
     return LightScene.load(house, textures or {}, RECIPE, sky)
 
@@ -44,8 +44,9 @@ def bare_room() -> tuple[House, Camera]:
 
 
 def hard_room() -> tuple[House, Camera]:
-    """The same with a coat on all walls, a smooth ball and a pane of glass in the patch, a mirror
-    beside it, and a shade that light passes."""
+    """The window room with a coat on all walls, a smooth ball and a pane of glass in the patch, a mirror
+    beside it, and a translucent shade.
+    """
     house, camera = bare_room()
     coated = replace(house.materials[0], specular=(0.5, 0.5, 0.5), roughness=0.6)
     glass = Material("glass", kind=MaterialKind.GLASS, opacity=0.1)
@@ -65,7 +66,7 @@ def hard_room() -> tuple[House, Camera]:
 
 
 def shiny_room() -> tuple[House, Camera]:
-    """The window room with a plate of brushed metal in the patch, which throws the sun at the walls."""
+    """The window room with a plate of brushed metal in the patch, which reflects the sun onto the walls."""
     house, camera = bare_room()
     coat = replace(rooms.matte("plate", 0.0), specular=(0.9, 0.8, 0.7), roughness=0.6)
     (walls,) = house.items
@@ -76,7 +77,7 @@ def shiny_room() -> tuple[House, Camera]:
 
 
 def seen_all_round() -> tuple[House, Camera]:
-    """The window room through the lens of a panorama."""
+    """The window room as a panorama."""
     house, camera = bare_room()
     intrinsics = LensFields(model="equirect").intrinsics(camera.intrinsics)
     return house, Camera(intrinsics, camera.world_from_camera).with_size(32, 16)
@@ -87,7 +88,7 @@ def renders(scene: LightScene, camera: Camera, seeds: range) -> list[LightResult
 
 
 def hide_points(patch: pytest.MonkeyPatch) -> None:
-    """Let views have no sunlit points."""
+    """Disable sunlit points."""
     from pbrs_farm.transport.kernels.sunlit_points import SunlitPoints
 
     real = SunlitPoints.set_view
@@ -106,7 +107,7 @@ def renders_by_chance(scene: LightScene, camera: Camera, fields: LightFields) ->
     ("room", "most"),
     [(bare_room, 0.4), (hard_room, 0.8), (shiny_room, 0.44), (seen_all_round, 0.6)],
 )
-def test_sunlit_points_leave_the_mean_alone_and_cut_the_noise(
+def test_sunlit_points_keep_the_mean_and_reduce_the_noise(
     room: Callable[[], tuple[House, Camera]], most: float
 ) -> None:
     # Significance: 16 blocks, |z| < 4.5 each is missed by chance once in 9000 runs.
@@ -123,13 +124,16 @@ def test_sunlit_points_leave_the_mean_alone_and_cut_the_noise(
 
 
 @pytest.mark.long
-def test_points_on_bumpy_coats_leave_the_mean_alone() -> None:
+def test_points_on_bumpy_coats_keep_the_mean() -> None:
     # Significance: 16 blocks, |z| < 4.5 each is missed by chance once in 9000 runs.
     house, camera = bare_room()
     coat = {"specular": (0.6, 0.5, 0.4), "roughness": 0.5, "normal_texture_id": "waves"}
     scene = sunny(with_material(house, **coat), textures={"waves": waves(0.4)})
-    both = renders_by_chance(scene, camera, FIELDS), renders(scene, camera, range(10, 18))
-    sums = [[blocks(r.group(Group.OUTDOOR)) for r in runs] for runs in both]
+    pictures_by_chance = (
+        renders_by_chance(scene, camera, FIELDS),
+        renders(scene, camera, range(10, 18)),
+    )
+    sums = [[blocks(r.group(Group.OUTDOOR)) for r in runs] for runs in pictures_by_chance]
     assert np.abs(z_scores(*sums)).max() < 4.5
 
 
@@ -145,23 +149,23 @@ def test_a_room_without_sun_has_no_points() -> None:
 
 
 def points_seen(emitters: object, p: np.ndarray, n: int) -> np.ndarray:
-    """(n,) whether a point is found from p."""
+    """(n,) bool: whether each point is visible from p."""
     import drjit as dr
     import mitsuba as mi
 
     u = (dr.arange(mi.Float, n) + 0.5) / n
-    at = mi.Point3f(*(mi.Float(float(x)) + 0 * u for x in p))
-    return emitters.sunlit.sample(at, u, mi.Bool(True)).valid.numpy()  # type: ignore[attr-defined]
+    point = mi.Point3f(*(mi.Float(float(x)) + 0 * u for x in p))
+    return emitters.sunlit.sample(point, u, mi.Bool(True)).valid.numpy()  # type: ignore[attr-defined]
 
 
-def test_points_lie_where_the_sun_shines_in_the_order_of_their_groups() -> None:
+def test_points_are_on_sunlit_surfaces_in_the_order_of_their_groups() -> None:
     from pbrs_farm.transport.kernels.sun_rays import COS_SUN, PLANE_PDF, RADIANCE
     from pbrs_farm.transport.kernels.sunlit_tables import find_used_cells, trace_points
 
     house, camera = bare_room()
     scene = sunny(house)
     emitters, weights = scene.emitters(camera, FIELDS, 1)
-    grid, device = emitters.outdoor_choice._grid, scene.device_scene
+    grid, device = emitters.outdoor_choice.grid, scene.device_scene
     used = find_used_cells(device, emitters.sun, grid, weights.vertices)
     assert used.shares.sum() == pytest.approx(1)
     tables = trace_points(device, emitters.sun, used, 1 << 20, 3)
@@ -171,7 +175,7 @@ def test_points_lie_where_the_sun_shines_in_the_order_of_their_groups() -> None:
     assert (rows[:, COS_SUN] > 0).all()
     assert (rows[:, PLANE_PDF] > 0).all()
     assert (rows[:, RADIANCE] > 0).all()
-    # Each begins a ray that leaves through the window, or stands before it.
+    # Each begins a ray that leaves through the window, or is in front of it.
     towards = np.asarray(scene.sky.sun_direction)
     inside = rows[:, 2] > 1e-3
     assert inside.mean() > 0.3
@@ -182,7 +186,7 @@ def test_points_lie_where_the_sun_shines_in_the_order_of_their_groups() -> None:
     assert (y[:, 1] < 2.15).all()
 
 
-def test_every_cell_that_points_are_said_to_come_from_has_sent_its_rays() -> None:
+def test_every_source_cell_of_points_has_sent_its_rays() -> None:
     # A terrace of 24 x 14 m has more cells than a small launch has rays.
     house, camera = bare_room()
     (walls,) = house.items
@@ -193,11 +197,11 @@ def test_every_cell_that_points_are_said_to_come_from_has_sent_its_rays() -> Non
     from pbrs_farm.transport.kernels.sun_rays import PLANE_PDF
     from pbrs_farm.transport.kernels.sunlit_tables import find_used_cells, trace_points
 
-    device, grid = scene.device_scene, emitters.outdoor_choice._grid
+    device, grid = scene.device_scene, emitters.outdoor_choice.grid
     used = find_used_cells(device, emitters.sun, grid, weights.vertices)
     for n_samples in (1, 1 << 22):
         tables = trace_points(device, emitters.sun, used, n_samples, 3)
-        # What a group's points stand for is the part of its cells that is lit, each cell once.
+        # A group's points represent the lit part of its cells, with each cell counted once.
         for group, (first, last) in enumerate(zip(tables.first, tables.first[1:], strict=False)):
             cells = (tables.cells[:, 0] > 0) & (tables.cells[:, 1] == group)
             area = cells.sum() * used.plane.edge_m**2
@@ -208,7 +212,7 @@ def test_every_cell_that_points_are_said_to_come_from_has_sent_its_rays() -> Non
 
 
 @pytest.mark.long
-def test_light_of_lamps_and_a_trial_beside_sunlit_points_leave_the_mean_alone(
+def test_lamps_and_a_trial_with_sunlit_points_keep_the_mean(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     # Significance: 16 blocks of two groups, |z| < 4.7 each is missed by chance once in 12,000 runs.
@@ -217,8 +221,10 @@ def test_light_of_lamps_and_a_trial_beside_sunlit_points_leave_the_mean_alone(
     house, camera = hard_rooms.open_shade()
     camera, scene = camera.with_size(32, 24), sunny(house)
     by_chance = renders_by_chance(scene, camera, FIELDS)
-    monkeypatch.setattr(pilot, "MIN_SAMPLES", 0)  # small pictures are tried, too
-    monkeypatch.setattr(pilot, "GUIDING_COST", 0)  # and guided: the sun's noise would say no
+    monkeypatch.setattr(pilot, "MIN_SAMPLES", 0)  # also try small pictures
+    monkeypatch.setattr(
+        pilot, "GUIDING_COST", 0
+    )  # force guiding, which the sun's noise would rule out
     by_points = renders(scene, camera, range(10, 18))
     assert all(r.facts["guided"] for r in by_points)
     for group in Group:
@@ -227,7 +233,7 @@ def test_light_of_lamps_and_a_trial_beside_sunlit_points_leave_the_mean_alone(
 
 
 @pytest.mark.long
-def test_points_count_from_the_length_of_path_on_that_they_stand_for() -> None:
+def test_points_count_from_the_path_length_they_represent() -> None:
     # Significance: 16 blocks, |z| < 4.5 each is missed by chance once in 9000 runs.
     house, camera = bare_room()
     scene = sunny(house)
@@ -236,7 +242,7 @@ def test_points_count_from_the_length_of_path_on_that_they_stand_for() -> None:
     by_points = [scene.render(camera, "-", longer, seed) for seed in range(10, 18)]
     sums = [[blocks(r.outdoor) for r in runs] for runs in (by_points, by_chance)]
     assert np.abs(z_scores(*sums)).max() < 4.5
-    # A path of one vertex has no second one for the sun to shine on.
+    # A path of one vertex has no second one for the sun to light.
     by_chance = renders_by_chance(scene, camera, short)
     np.testing.assert_array_equal(
         scene.render(camera, "-", short, 20).outdoor, by_chance[0].outdoor
@@ -248,8 +254,8 @@ def test_another_view_in_between_changes_no_bit() -> None:
     house, camera = bare_room()
     scene = sunny(house)
     first = scene.render(camera, "-", FIELDS, 1)
-    other = rooms.camera((2.0, 1.2, 0.5), (1.0, 0.5, 3.5)).with_size(32, 24)
-    scene.render(other, "-", FIELDS, 2)
+    other_camera = rooms.camera((2.0, 1.2, 0.5), (1.0, 0.5, 3.5)).with_size(32, 24)
+    scene.render(other_camera, "-", FIELDS, 2)
     scene.floor_lux(house)
     np.testing.assert_array_equal(scene.render(camera, "-", FIELDS, 1).outdoor, first.outdoor)
 
@@ -259,7 +265,7 @@ def test_paths_have_one_kernel_with_sunlit_points_and_without() -> None:
 
     house, camera = rooms.window_room(0.7, lumen=800.0)
     camera, few = camera.with_size(16, 12), FIELDS.model_copy(update={"spp": 1})
-    found = set()
+    hashes = set()
     for azimuth_rad in (0.35, np.pi):
         scene = sunny(house, azimuth_rad=azimuth_rad)
         scene.render(camera, "-", few, 1)
@@ -267,8 +273,8 @@ def test_paths_have_one_kernel_with_sunlit_points_and_without() -> None:
         with dr.scoped_set_flag(dr.JitFlag.KernelHistory):
             scene.render(camera, "-", few, 2)
             kernels = dr.kernel_history([dr.KernelType.JIT])
-        found |= {k["hash"] for k in kernels if k["operation_count"] > 4000}
-    assert len(found) == 1
+        hashes |= {k["hash"] for k in kernels if k["operation_count"] > 4000}
+    assert len(hashes) == 1
 
 
 def test_a_cell_is_found_again_along_the_sun() -> None:
@@ -282,14 +288,14 @@ def test_a_cell_is_found_again_along_the_sun() -> None:
     cell = dr.arange(mi.UInt32, plane.n_cells)
     d = mi.Vector3f(*direction.tolist())
     p = plane.point(cell, mi.Point2f(0.3, 0.8)) - 1.5 * d
-    found, inside = plane.cell(p, d)
+    cells, inside = plane.cell(p, d)
     assert inside.numpy().all()
-    np.testing.assert_array_equal(found.numpy(), cell.numpy())
+    np.testing.assert_array_equal(cells.numpy(), cell.numpy())
     _found, inside = plane.cell(mi.Point3f(40.0, 0, 0), d)
     assert not inside.numpy().any()
 
 
-def test_a_vast_plane_has_no_more_cells_than_fit() -> None:
+def test_a_vast_plane_has_at_most_the_fitting_cells() -> None:
     from pbrs_farm.transport.kernels.sun import SunPlane
 
     plane = SunPlane(np.array([0.0, 1.0, 0.0]), np.array([(0.0, 0, 0), (90, 3, 70)]))

@@ -50,7 +50,7 @@ SLOW = ("window", "glass globe", "open shade")
 @pytest.mark.parametrize(
     "name", [pytest.param(n, marks=pytest.mark.slow) if n in SLOW else n for n in SCENES]
 )
-def test_metropolis_and_path_have_one_mean(name: str) -> None:
+def test_metropolis_and_path_have_the_same_mean(name: str) -> None:
     # Significance: 16 blocks of each group, |z| < 5: missed by chance once in 50,000 runs.
     house, camera, sky = SCENES[name]()
     scene = LightScene.load(house, {}, RECIPE, sky)
@@ -70,7 +70,7 @@ def test_metropolis_and_path_have_one_mean(name: str) -> None:
         assert np.mean(ours) == pytest.approx(np.mean(theirs), rel=0.1)
 
 
-def test_no_light_at_all_is_an_error_that_says_what_there_is() -> None:
+def test_a_scene_without_light_is_an_error_that_lists_its_emitters() -> None:
     house = rooms.house(rooms.shell((4, 2.5, 4), 0), [rooms.matte("wall", 0.9)])
     camera = rooms.camera((0.5, 1.5, 0.5), (3.9, 0.2, 3.9))
     with pytest.raises(RenderFailed, match="a sky and 0 lamps in the house"):
@@ -81,8 +81,8 @@ def test_a_time_budget_ends_the_mutations() -> None:
     house, camera = rooms.window_room(lumen=800)
     fields = {**METROPOLIS.model_dump(), "time_budget_s": 0.2, "mutations_per_pixel": 100_000}
     result = rendered(house, camera, dark_sky(), **fields)
-    wanted = 100_000 * 32 * 24
-    assert 0 < result.facts["indoor"]["mutations"] < wanted
+    budget = 100_000 * 32 * 24
+    assert 0 < result.facts["indoor"]["mutations"] < budget
     assert result.indoor.mean() > 0
 
 
@@ -110,11 +110,11 @@ def test_chains_that_share_nothing_splat_every_step(tail_pixels: int, min_segmen
     run = chain_run(view, Group.INDOOR, min_segments=min_segments)
     assert run is not None
     run.advance(4)
-    # Each step leaves light of target function 1 in all, where it was and where it was to go.
+    # Each step deposits a total target function of 1, at its old and proposed positions.
     state = run.state()
     luminance = state["splats"].reshape(2, -1, 3).sum(0) @ LUMINANCE
-    left = float((luminance * state["importance"]).sum())
-    assert left == pytest.approx(4 * run.n_chains, rel=1e-3)
+    remaining = float((luminance * state["importance"]).sum())
+    assert remaining == pytest.approx(4 * run.n_chains, rel=1e-3)
 
 
 @pytest.mark.long
@@ -141,7 +141,7 @@ def test_the_rounds_of_a_launch_change_no_picture(monkeypatch: pytest.MonkeyPatc
 
     house, camera = rooms.window_room(0.7, lumen=800)
     scene = LightScene.load(house, {}, RECIPE, dark_sky())
-    # 102 steps of each chain are six rounds and a part of one.
+    # 102 steps of each chain are six full rounds and a partial one.
     fields = METROPOLIS.model_copy(update={"chains": 384, "mutations_per_pixel": 51})
     pictures = []
     for n in (1, 4 * 384, 1 << 20):
@@ -159,10 +159,10 @@ def test_the_halves_of_the_film_share_no_prefix(n_chains: int, n_pixels: int) ->
     from pbrs_farm.transport.metropolis.film import ROUND_STEPS
     from pbrs_farm.transport.metropolis.prefixes import prefix_schedule
 
-    n_sets, every = prefix_schedule(n_chains, n_pixels)
+    n_sets, order = prefix_schedule(n_chains, n_pixels)
     assert n_sets > 0
     assert n_sets % 2 == 0
-    mutations_per_prefix = every * n_chains * ROUND_STEPS / (n_pixels * n_sets)
+    mutations_per_prefix = order * n_chains * ROUND_STEPS / (n_pixels * n_sets)
     assert 2 < mutations_per_prefix < 8
 
 

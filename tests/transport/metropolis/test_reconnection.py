@@ -1,4 +1,4 @@
-"""Suffixes reconnected to many pixels: the groups, and that sharing changes no mean."""
+"""Suffixes reconnected to many pixels: grouping, and unbiased sharing."""
 
 from __future__ import annotations
 
@@ -27,7 +27,7 @@ pytestmark = pytest.mark.skipif(
 @pytest.mark.parametrize(
     ("height", "width", "n"), [(24, 32, 64), (23, 31, 256), (5, 7, 1024), (4, 4, 1)]
 )
-def test_every_pixel_is_in_one_group_and_groups_are_no_larger_than_asked(
+def test_every_pixel_is_in_one_group_of_at_most_the_requested_size(
     height: int, width: int, n: int
 ) -> None:
     from pbrs_farm.transport.metropolis.film import stratified_groups
@@ -49,7 +49,7 @@ def test_groups_are_spread_and_neighbours_are_apart() -> None:
     assert np.array_equal(np.sort(cells, 1), np.tile(np.arange(16), (256, 1)))
 
 
-def test_importance_is_high_where_it_is_dark_and_bounded() -> None:
+def test_importance_is_high_in_the_dark_and_bounded() -> None:
     from pbrs_farm.transport.metropolis.chain_start import pixel_importance
 
     rng = np.random.default_rng(0)
@@ -70,7 +70,7 @@ def test_a_black_picture_has_even_importance() -> None:
 
 
 def coated_room() -> tuple[House, Camera]:
-    """Every kind of second vertex: coats rough and smooth, a metal, a translucent sheet, glass."""
+    """Every kind of second vertex: rough and smooth coats, a metal, a translucent sheet, glass."""
     surfaces = rooms.shell((4.0, 2.5, 4.0), 0)
     surfaces.append(rooms.box((2.4, 0.0, 2.4), (3.2, 0.6, 3.2), 1, "smooth"))
     surfaces.append(rooms.box((0.8, 0.0, 2.6), (1.6, 0.9, 3.4), 2, "metal"))
@@ -91,7 +91,7 @@ def coated_room() -> tuple[House, Camera]:
 
 
 def slot_room() -> tuple[House, Camera]:
-    """A slot of 6 cm between two boxes, seen from its open end: most light in it goes a hand's way."""
+    """A slot of 6 cm between two boxes, seen from its open end: most light in it travels a few centimetres."""
     surfaces = rooms.shell((4.0, 2.5, 4.0), 0)
     surfaces.append(rooms.box((1.0, 0.0, 2.4), (1.97, 0.6, 3.2), 1, "left"))
     surfaces.append(rooms.box((2.03, 0.0, 2.4), (3.0, 0.6, 3.2), 1, "right"))
@@ -103,7 +103,7 @@ def slot_room() -> tuple[House, Camera]:
 
 
 def shaded_room() -> tuple[House, Camera]:
-    """A bulb deep in a shade, another in a cup in a globe: rays are guided; coated walls and boxes."""
+    """A bulb deep in a shade, another in a cup in a globe, guided rays, coated walls and boxes."""
     surfaces = rooms.shell((4.0, 2.5, 4.0), 0)
     surfaces.append(hard_rooms.cylinder((2.0, 1.3, 2.2), 0.12, 0.35, 1))
     surfaces.append(rooms.box((2.4, 0.0, 2.4), (3.2, 0.6, 3.2), 2, "glossy"))
@@ -154,7 +154,7 @@ def test_reconnected_suffixes_leave_the_mean_as_path_has_it(
 
 
 def test_kernels_with_other_local_memory_are_other_kernels() -> None:
-    # The larger one first: were they one kernel, the smaller one would have room to spare.
+    # The larger kernel first: if both shared a kernel, the smaller one would have spare room.
     house, camera = rooms.window_room(0.7, lumen=800)
     scene = LightScene.load(house, {}, RECIPE, dark_sky())
     few = METROPOLIS.model_copy(update={"direct_spp": 1, "mutations_per_pixel": 1})
@@ -164,8 +164,8 @@ def test_kernels_with_other_local_memory_are_other_kernels() -> None:
             dr.kernel_history_clear()
             fields = few.model_copy(update={"tail_pixels": n})
             scene.render(camera.with_size(32, 24), "0_0", fields, 7)
-            made = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
-        kernels[n] |= {(k["operation_count"], k["hash"]) for k in made}
+            compiled = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
+        kernels[n] |= {(k["operation_count"], k["hash"]) for k in compiled}
     large, small = kernels[512] - kernels[256], kernels[256] - kernels[512]
     assert {operations for operations, _ in large} & {operations for operations, _ in small}
 

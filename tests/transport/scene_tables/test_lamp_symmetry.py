@@ -1,4 +1,4 @@
-"""Which lamps count as convex and symmetric, so that no shadow ray goes to their far side."""
+"""Convex and symmetric lamps are recognised, so that no shadow ray goes to their far side."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ def test_a_sphere_is_symmetric_about_its_centre_and_knows_its_outside() -> None:
     assert np.allclose(symmetry_row(ball()[:, ::-1]), (3, 2, -7, -0.04), atol=1e-4)
 
 
-def test_what_shows_its_inside_or_has_no_opposite_is_not_symmetric() -> None:
+def test_a_lamp_that_shows_its_inside_or_has_no_opposite_is_not_symmetric() -> None:
     whole = ball()
     centre = np.array((3.0, 2.0, -7.0))
     half = whole[whole[..., 1].mean(1) > 2.0]
@@ -49,9 +49,7 @@ def test_what_shows_its_inside_or_has_no_opposite_is_not_symmetric() -> None:
         (Material("shade", kind=MaterialKind.SHADE, diffuse=(0.5, 0.5, 0.5)), 0),
     ],
 )
-def test_a_lamp_whose_faces_let_light_through_shows_its_inside(
-    material: Material, radius: float
-) -> None:
+def test_a_lamp_with_translucent_faces_shows_its_inside(material: Material, radius: float) -> None:
     walls = rooms.shell((4.0, 2.5, 4.0), 0)
     lamp = rooms.bulb((1.0, 2.0, 1.0), 1, 900.0)
     house = rooms.house(walls, [rooms.matte("wall", 0.7), material], lamps=[lamp])

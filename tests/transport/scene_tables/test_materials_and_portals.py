@@ -19,33 +19,35 @@ FAST = recipe_from_name("fast")
 EMPTY = TextureAtlas(np.zeros(1, np.uint32), {})
 
 
-def one(material: Material, recipe: Recipe = FAST) -> tuple[np.ndarray, list[str]]:
+def single_row(material: Material, recipe: Recipe = FAST) -> tuple[np.ndarray, list[str]]:
     rows, notes = material_rows(rooms.house([], [material]), EMPTY, recipe)
     return rows[0], notes
 
 
 def test_whites_stop_at_the_albedo_of_paint() -> None:
-    row, _notes = one(Material("white"))
+    row, _notes = single_row(Material("white"))
     np.testing.assert_allclose(row[:3], MAX_ALBEDO)
 
 
 def test_kd_and_ks_above_one_are_scaled_and_reported() -> None:
     bright = Material("bright", diffuse=(1, 1, 1), specular=(1, 1, 1), shininess=50)
-    row, notes = one(bright)
+    row, notes = single_row(bright)
     assert row[4] == pytest.approx(0.08)
     assert any("'bright'" in n and "scaled" in n for n in notes)
-    metal, _notes = one(Material("m", diffuse=(0.2, 0.2, 0.2), specular=(1, 1, 1), shininess=50))
+    metal, _notes = single_row(
+        Material("m", diffuse=(0.2, 0.2, 0.2), specular=(1, 1, 1), shininess=50)
+    )
     assert metal[0] + metal[4] <= 1 + 1e-6
 
 
 def test_the_released_preset_reads_kd_as_linear_and_glass_as_nothing() -> None:
     released = recipe_from_name("released")
-    grey, _notes = one(
+    grey, _notes = single_row(
         Material("grey", diffuse=(0.5, 0.5, 0.5), specular=(1, 1, 1), shininess=9), released
     )
     assert grey[0] == 0.5
     assert grey[7] == 0
-    glass, _notes = one(Material("glass", opacity=0.5), released)
+    glass, _notes = single_row(Material("glass", opacity=0.5), released)
     assert glass[11] == 3
 
 

@@ -1,4 +1,4 @@
-"""What a ray needs to know of each face."""
+"""Per-face data that rays need."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ UP = (0.0, 1.0, 0.0)
 
 
 def geometry(normals: np.ndarray, uvs: np.ndarray) -> Geometry:
-    """A face for each three rows: a triangle of the floor, seen from above."""
+    """One floor triangle per three rows, seen from above."""
     n = len(normals) // 3
     corners = np.array([[0, 0, 0], [0, 0, 1], [1, 0, 0]], np.float32)
     nothing = np.zeros(n, np.int32)
@@ -30,30 +30,30 @@ def geometry(normals: np.ndarray, uvs: np.ndarray) -> Geometry:
 
 def rows_of(normals: np.ndarray, uvs: np.ndarray) -> np.ndarray:
     g = geometry(normals, uvs)
-    return scene_tables._face_rows(g, g.faces)
+    return scene_tables.rows_of_faces(g, g.faces)
 
 
 @pytest.mark.parametrize(
     ("given", "kept"),
     [
         ((0.6, 0.8, 0.0), (0.6, 0.8, 0.0)),
-        ((0.0, -1.0, 0.0), UP),  # all three turned to the front
+        ((0.0, -1.0, 0.0), UP),  # all three are turned to the front
         ((0.0, 0.0, 0.0), UP),
         ((np.nan, 0.0, 0.0), UP),
         ((0.0, 0.0, 5.0), UP),
-        ((1.0, 0.0, 0.0), UP),  # leans back to the rim
+        ((1.0, 0.0, 0.0), UP),  # on the horizon
     ],
 )
-def test_a_corner_keeps_its_normal_where_that_is_one(given: tuple, kept: tuple) -> None:
+def test_a_valid_corner_normal_is_kept(given: tuple, kept: tuple) -> None:
     (row,) = rows_of(np.tile(given, (3, 1)), np.zeros((3, 2)))
     for columns in NORMALS:
         assert row[columns] == pytest.approx(kept, abs=1e-6)
 
 
-def test_one_bad_normal_leaves_the_others() -> None:
+def test_one_bad_normal_does_not_change_the_others() -> None:
     (row,) = rows_of(np.array([(0.6, 0.8, 0), (0, 0, 0), (0, 0.8, 0.6)]), np.zeros((3, 2)))
-    found = [row[columns] for columns in NORMALS]
-    assert np.allclose(found, [(0.6, 0.8, 0), UP, (0, 0.8, 0.6)], atol=1e-6)
+    rows = [row[columns] for columns in NORMALS]
+    assert np.allclose(rows, [(0.6, 0.8, 0), UP, (0, 0.8, 0.6)], atol=1e-6)
 
 
 def test_texture_coordinates_begin_within_the_first_turn() -> None:
@@ -67,8 +67,8 @@ def test_rows_and_refused_faces_do_not_depend_on_the_part_they_are_made_in(
     rng = np.random.default_rng(3)
     g = geometry(rng.normal(0, 1, (300, 3)), rng.normal(0, 9, (300, 2)))
     g.positions[rng.integers(0, 300, 20)] = np.nan
-    whole = scene_tables._face_rows(g, g.faces), scene_tables.solid_faces(g)
+    whole = scene_tables.rows_of_faces(g, g.faces), scene_tables.solid_faces(g)
     monkeypatch.setattr(scene_tables, "FACES_AT_ONCE", 7)
-    parts = scene_tables._face_rows(g, g.faces), scene_tables.solid_faces(g)
+    parts = scene_tables.rows_of_faces(g, g.faces), scene_tables.solid_faces(g)
     assert [a.tobytes() for a in parts] == [a.tobytes() for a in whole]
     assert 0 < whole[1].sum() < 100

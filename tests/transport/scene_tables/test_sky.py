@@ -21,7 +21,7 @@ FAST = recipe_from_name("fast")
 
 
 def clear(elevation_deg: float, *, overcast: bool = False) -> Recipe:
-    """A recipe whose sun is there."""
+    """A recipe with an unclouded sun at that height."""
     words = {"sky.sun_elevation_deg": str(elevation_deg), "sky.overcast": str(overcast).lower()}
     return recipe_from_name("fast", words)
 
@@ -34,16 +34,14 @@ def panorama(sun: float = 20_000.0) -> np.ndarray:
 
 
 @pytest.mark.parametrize("factor", [0.01, 1.0, 100.0])
-def test_a_panorama_of_any_scale_gives_one_sky_level_and_no_more_sun_than_allowed(
-    factor: float,
-) -> None:
+def test_a_panorama_of_any_scale_gives_one_sky_level_and_a_limited_sun(factor: float) -> None:
     sky = sky_from_panorama("p", panorama() * factor, FAST, rotation_rad=1.0)
     assert sky.sky_lx == pytest.approx(10_000, rel=1e-3)
     assert 0 < sky.sun_lx <= 103_000
     assert sky.dome.max() < 100 * sky.dome.mean()
 
 
-def test_the_sun_of_a_panorama_lies_where_its_brightest_texel_was_turned_to() -> None:
+def test_a_turned_panorama_puts_the_sun_at_its_brightest_texel() -> None:
     sky = sky_from_panorama("p", panorama(), FAST, rotation_rad=0.0)
     theta, phi = (20 + 0.5) / 64 * math.pi, (40 + 0.5) / 128 * 2 * math.pi
     expected = [math.sin(theta) * math.sin(phi), math.cos(theta), -math.sin(theta) * math.cos(phi)]
@@ -90,10 +88,12 @@ def test_a_third_of_houses_is_lit_by_lamps_and_paper_never() -> None:
         assert recipe_from_name(name).sky.time == "day"
 
 
-def test_a_told_sun_is_no_drawn_one() -> None:
+def test_a_sun_of_the_recipe_is_not_drawn() -> None:
     for name in ("home-1", "home-2", "home-3", "home-4", "home-5", "home-6"):
-        told = recipe_from_name("fast", {"sky.sun_elevation_deg": "30"})
-        assert sky_for_house(told, name).facts()["sun_elevation_deg"] == pytest.approx(30, abs=1e-3)
+        set_sun = recipe_from_name("fast", {"sky.sun_elevation_deg": "30"})
+        assert sky_for_house(set_sun, name).facts()["sun_elevation_deg"] == pytest.approx(
+            30, abs=1e-3
+        )
 
 
 @pytest.mark.parametrize(
@@ -108,22 +108,22 @@ def test_a_told_sun_is_no_drawn_one() -> None:
         (0, 48, 80, -42, 0),
     ],
 )
-def test_the_sun_of_an_hour_stands_where_spherical_trigonometry_says(
+def test_the_sun_of_an_hour_agrees_with_spherical_trigonometry(
     hour: float, latitude: float, day: int, elevation: float, azimuth: float | None
 ) -> None:
-    found = np.degrees(sun_of_hour(hour, latitude, day))
-    assert found[0] == pytest.approx(elevation, abs=0.6)
+    angles = np.degrees(sun_of_hour(hour, latitude, day))
+    assert angles[0] == pytest.approx(elevation, abs=0.6)
     if azimuth is not None:
-        turn = (found[1] - azimuth + 180) % 360 - 180
+        turn = (angles[1] - azimuth + 180) % 360 - 180
         assert turn == pytest.approx(0, abs=1.5)
 
 
 def test_the_lower_the_sun_below_the_horizon_the_darker_and_bluer_the_sky() -> None:
     def dusk(degrees: float):
-        told = recipe_from_name(
+        recipe = recipe_from_name(
             "paper", {"sky.kind": "sunsky", "sky.sun_elevation_deg": str(degrees)}
         )
-        return sky_for_house(told, "h")
+        return sky_for_house(recipe, "h")
 
     skies = [dusk(d) for d in (-0.5, -3, -6, -12, -40)]
     lux = [s.sky_lx for s in skies]
@@ -149,11 +149,11 @@ def test_open_ground_has_the_lux_of_the_tables_by_clear_sky_sun_and_town(
 
 
 def test_the_sky_has_no_step_at_the_horizon() -> None:
-    above, at, below = (sky_for_house(clear(d), "h") for d in (0.05, 0.0, -0.05))
-    assert above.sky_lx == pytest.approx(at.sky_lx, rel=0.03)
-    assert below.sky_lx == pytest.approx(at.sky_lx, rel=0.06)
-    assert at.sun_lx == 0
-    np.testing.assert_allclose(below.dome[100], at.dome[100], rtol=0.1)
+    above, level, below = (sky_for_house(clear(d), "h") for d in (0.05, 0.0, -0.05))
+    assert above.sky_lx == pytest.approx(level.sky_lx, rel=0.03)
+    assert below.sky_lx == pytest.approx(level.sky_lx, rel=0.06)
+    assert level.sun_lx == 0
+    np.testing.assert_allclose(below.dome[100], level.dome[100], rtol=0.1)
 
 
 def test_an_overcast_sky_is_three_times_as_bright_at_the_zenith_and_has_no_sun() -> None:
@@ -175,6 +175,6 @@ def test_the_hour_is_in_the_digest_of_a_sky() -> None:
 
 def test_an_edited_home_keeps_the_weather_of_the_home() -> None:
     skies = [sky_for_house(Recipe(), house_id) for house_id in ("flat-1234", "flat-1234-e0123abcd")]
-    other = sky_for_house(Recipe(), "flat-1235")
+    neighbour_sky = sky_for_house(Recipe(), "flat-1235")
     assert np.array_equal(skies[0].sun_direction, skies[1].sun_direction)
-    assert not np.array_equal(skies[0].sun_direction, other.sun_direction)
+    assert not np.array_equal(skies[0].sun_direction, neighbour_sky.sun_direction)

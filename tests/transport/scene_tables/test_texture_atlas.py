@@ -10,7 +10,7 @@ from pbrs_farm.transport.scene_tables.texture_atlas import texture_atlas, unpack
 from pbrs_farm.transport.validation import known_rooms as rooms
 
 
-def test_maps_are_packed_as_they_are_at_the_larger_size() -> None:
+def test_maps_are_packed_unchanged_at_the_larger_size() -> None:
     material = Material("m", roughness_texture_id="r", normal_texture_id="n")
     rough = np.zeros((4, 4, 3), np.uint8)
     rough[..., 1] = np.arange(16).reshape(4, 4) * 17
@@ -28,7 +28,7 @@ def test_maps_are_packed_as_they_are_at_the_larger_size() -> None:
 
 
 def test_a_picture_too_large_is_averaged_and_not_thinned_out() -> None:
-    # Stripes one pixel wide, which every second pixel alone would show as all black.
+    # Stripes one pixel wide: sampling every second pixel would give black.
     stripes = np.zeros((6, 4096, 3), np.uint8)
     stripes[:, 1::2] = 255
     house = rooms.house([], [Material("t", texture_id="t")])

@@ -57,9 +57,9 @@ def test_shards_are_split_by_house_and_mixed(root, tmp_path):
     assert sum(packed.n_views.values()) == 24
     views = pbrs_farm.open(tmp_path / "x")
     for split, n in packed.n_views.items():
-        own = views.only(split=split)
-        assert len(own) == n
-        assert all(split_of_house(home, shares) == split for home in own.homes)
+        part = views.only(split=split)
+        assert len(part) == n
+        assert all(split_of_house(home, shares) == split for home in part.homes)
     first = json.loads((tmp_path / "x/dataset.json").read_text())["shards"][0]
     houses = {v.house for v in _facts(tmp_path / "x" / first["file"])}
     assert len(houses) > 1
@@ -88,14 +88,14 @@ def test_other_programs_read_the_parts(root, tmp_path):
     assert (np.load(io.BytesIO(data[f"{key}.depth.npz"]))["depth"] == stored["depth.png"]).all()
 
 
-def test_dataset_json_and_card_say_what_is_there(root, tmp_path):
+def test_dataset_json_and_card_describe_the_views(root, tmp_path):
     pack(pbrs_farm.open(root), tmp_path / "x", Packing((8, 6), modes=MODES, shares=SplitShares()))
-    said = json.loads((tmp_path / "x/dataset.json").read_text())
-    assert said["classes"][1] == "wall"
-    assert len(said["class_colours_srgb"]) == 41
-    assert said["arrays"]["depth"]["unit"].startswith("mm")
-    assert said["size"] == [8, 6]
-    assert said["credits"] == [f"home {home}: a person" for home in HOUSES]
+    description = json.loads((tmp_path / "x/dataset.json").read_text())
+    assert description["classes"][1] == "wall"
+    assert len(description["class_colours_srgb"]) == 41
+    assert description["arrays"]["depth"]["unit"].startswith("mm")
+    assert description["size"] == [8, 6]
+    assert description["credits"] == [f"home {home}: a person" for home in HOUSES]
     card = (tmp_path / "x/README.md").read_text()
     assert "24 views, 8 homes or variants of homes, 8x6" in card
     assert "home home-3-00000000: a person" in card
@@ -163,21 +163,21 @@ def test_parquet_that_is_not_split_is_a_split_that_datasets_takes(root, tmp_path
     card = (tmp_path / "x/README.md").read_text()
     assert "split: train" in card
     assert "all-" not in card
-    said = json.loads((tmp_path / "x/croissant.json").read_text())
-    (file, _files) = said["distribution"]
+    description = json.loads((tmp_path / "x/croissant.json").read_text())
+    (file, _files) = description["distribution"]
     data = (tmp_path / "x" / file["contentUrl"]).read_bytes()
     assert file["sha256"] == hashlib.sha256(data).hexdigest()
 
 
 @pytest.mark.long
-def test_the_card_says_what_is_true_of_the_root(tmp_path):
+def test_the_card_is_true_of_the_root(tmp_path):
     home = small_home().set(**{"light.spp": 3})
     frames = pbrs_farm.render(home, home.cameras(n=2), modes=["mlt_il_ol"])
     frames.save(tmp_path / "root")
     packing = Packing((32, 24), modes=("mlt_il_ol",), seed=5, colour="jpeg")
     pack(pbrs_farm.open(tmp_path / "root"), tmp_path / "x", packing, form="parquet")
     card = (tmp_path / "x/README.md").read_text()
-    for said in (
+    for text in (
         f"| {home.id} | 2 | Apache-2.0 | pbrs_farm |",
         "Rendered at 64x48; horizontal field of view",
         "preset photo, lens pinhole",
@@ -189,19 +189,19 @@ def test_the_card_says_what_is_true_of_the_root(tmp_path):
         "JPEG of quality 95",
         "It is not split.",
     ):
-        assert said in card, said
+        assert text in card, text
     shares = re.findall(r"\| ([\d.]+) % \|", card)
     assert sum(map(float, shares)) == pytest.approx(100, abs=0.5)
 
 
-def test_a_root_without_a_recipe_or_licences_is_told(root, tmp_path):
+def test_a_root_without_a_recipe_or_licences_is_refused(root, tmp_path):
     pack(pbrs_farm.open(root), tmp_path / "x", Packing(modes=MODES))
     card = (tmp_path / "x/README.md").read_text()
     assert "has no recipe.json" in card
     assert "Homes whose source names no licence: 8." in card
 
 
-def test_a_truncated_or_missing_shard_is_one_clear_line(root, tmp_path):
+def test_a_truncated_or_missing_shard_is_reported_in_one_line(root, tmp_path):
     pack(pbrs_farm.open(root), tmp_path / "x", Packing(modes=MODES, views_per_shard=10))
     shard = tmp_path / "x/all-000001.tar"
     whole = shard.read_bytes()
@@ -216,7 +216,7 @@ def test_a_truncated_or_missing_shard_is_one_clear_line(root, tmp_path):
         pbrs_farm.open(tmp_path / "x")
 
 
-def test_what_was_not_packed_is_told(root, tmp_path):
+def test_skipped_views_are_reported(root, tmp_path):
     pack(
         pbrs_farm.open(root),
         tmp_path / "x",
@@ -233,15 +233,15 @@ def test_what_was_not_packed_is_told(root, tmp_path):
         pack(pbrs_farm.open(tmp_path / "x"), tmp_path / "y", Packing())
 
 
-def test_the_verb_packs_and_says_what_it_left_out(tmp_path, capsys):
+def test_the_verb_packs_and_lists_skipped_views(tmp_path, capsys):
     root, out = tmp_path / "root", tmp_path / "out"
     fill(FolderStore(root), {"one-00000001": 3})
     (root / "houses/one-00000001/views/0_0_2/mlt_il_ol.png").unlink()
     words = ["pack", str(root), "--size", "8x6", "--split", "--out", str(out)]
     assert main(words) == 0
-    said = capsys.readouterr()
-    assert "1 view left out, one-00000001/0_0_2: no mlt_il_ol.png" in said.err
-    assert "2 views, 3 files" in said.out
+    output = capsys.readouterr()
+    assert "1 view left out, one-00000001/0_0_2: no mlt_il_ol.png" in output.err
+    assert "2 views, 3 files" in output.out
     assert "lack a layer: 1." in (out / "README.md").read_text()
     assert main(words) == 1
     assert "already exists" in capsys.readouterr().err
@@ -250,7 +250,7 @@ def test_the_verb_packs_and_says_what_it_left_out(tmp_path, capsys):
     assert not (tmp_path / "y").exists()
 
 
-def test_shards_are_read_where_there_is_numpy_alone(root, tmp_path):
+def test_shards_are_read_with_only_numpy(root, tmp_path):
     pack(pbrs_farm.open(root), tmp_path / "x", Packing((8, 6), modes=MODES, shares=SplitShares()))
     code = f"""
 import sys

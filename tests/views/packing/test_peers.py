@@ -1,5 +1,6 @@
-"""What other people's libraries make of our files and figures: webdataset, datasets, mlcroissant,
-torchmetrics, pycocotools."""
+"""Third-party libraries with our files and figures: webdataset, datasets, mlcroissant,
+torchmetrics, pycocotools.
+"""
 
 from __future__ import annotations
 
@@ -32,7 +33,7 @@ def test_webdataset_reads_every_view_with_all_its_bits(tmp_path: Path) -> None:
     tars = [str(tar) for tar in sorted((tmp_path / "shards").glob("*.tar"))]
     assert len(tars) == 2
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore")  # of its own making
+        warnings.simplefilter("ignore")  # warnings of the library itself
         read = list(webdataset.WebDataset(tars, shardshuffle=False).decode("rgb8"))
     assert len(read) == 5
     for sample in read:
@@ -41,7 +42,7 @@ def test_webdataset_reads_every_view_with_all_its_bits(tmp_path: Path) -> None:
         assert sample["json"]["house"] == house
         for mode in MODES:
             assert np.array_equal(sample[f"{mode}.png"], stored[f"{mode}.png"])
-        # Labels of 16 bits come as they were stored, which its picture decoders would not do.
+        # Labels of 16 bits come unchanged, which its picture decoders would not do.
         for part, name in (("normal", "normal"), ("depth", "depth"), ("instance", "instance")):
             array = sample[f"{part}.npz"][name]
             assert array.dtype == np.uint16
@@ -49,7 +50,7 @@ def test_webdataset_reads_every_view_with_all_its_bits(tmp_path: Path) -> None:
         assert np.array_equal(sample["normal.npz"]["valid"], stored["valid.png"])
 
 
-@pytest.mark.filterwarnings("ignore")  # of its own making
+@pytest.mark.filterwarnings("ignore")  # warnings of the library itself
 @pytest.mark.parametrize("shares", [None, SplitShares(0.5, 0.0, 0.5)])
 def test_datasets_loads_a_folder_of_parquet_with_all_its_bits(
     tmp_path: Path, shares: SplitShares | None
@@ -73,7 +74,7 @@ def test_datasets_loads_a_folder_of_parquet_with_all_its_bits(
             assert np.array_equal(row[name], stored[f"{file}.png"])
 
 
-@pytest.mark.filterwarnings("ignore")  # of its own making
+@pytest.mark.filterwarnings("ignore")  # warnings of the library itself
 def test_labels_are_arrays_of_16_bits_in_the_torch_format_of_datasets(tmp_path: Path) -> None:
     import datasets
 
@@ -90,13 +91,13 @@ def test_labels_are_arrays_of_16_bits_in_the_torch_format_of_datasets(tmp_path: 
             file = "semantic" if name == "class40" else name
             assert row[name].dtype == torch.uint16
             assert np.array_equal(row[name].numpy(), stored[f"{file}.png"])
-    # Unasked, `datasets` makes int64 of them: what a loss of classes takes.
+    # By default `datasets` converts them to int64, the type for losses over classes.
     row = rows.with_format("torch")[0]
     assert (row["class40"].dtype, row["class40"].ndim) == (torch.int64, 2)
 
 
-@pytest.mark.filterwarnings("ignore")  # of its own making
-def test_mlcroissant_validates_what_lies_beside_parquet_and_reads_it(tmp_path: Path) -> None:
+@pytest.mark.filterwarnings("ignore")  # warnings of the library itself
+def test_mlcroissant_validates_and_reads_the_file_beside_parquet(tmp_path: Path) -> None:
     import mlcroissant
 
     fill(FolderStore(tmp_path / "root"), {f"home-{k}-00000000": 3 for k in range(6)})
@@ -108,11 +109,11 @@ def test_mlcroissant_validates_what_lies_beside_parquet_and_reads_it(tmp_path: P
         rows = list(dataset.records(split))
         assert len(rows) == n_views
         for row in rows:
-            found = {name.rpartition("/")[2]: value for name, value in row.items()}
-            number = found["house"].decode().split("-")[1]
-            stored = arrays_of_view(1000 * int(number) + int(found["id"].decode()[-1]))
-            assert np.array_equal(np.asarray(found["mlt_il_ol"]), stored["mlt_il_ol.png"])
-            normal = np.array([list(map(list, line)) for line in found["normal"]])
+            values = {name.rpartition("/")[2]: value for name, value in row.items()}
+            number = values["house"].decode().split("-")[1]
+            stored = arrays_of_view(1000 * int(number) + int(values["id"].decode()[-1]))
+            assert np.array_equal(np.asarray(values["mlt_il_ol"]), stored["mlt_il_ol.png"])
+            normal = np.array([list(map(list, line)) for line in values["normal"]])
             assert np.array_equal(normal, stored["normal.png"])
 
 
@@ -129,7 +130,9 @@ def test_mean_iou_is_that_of_torchmetrics(seed: int) -> None:
     assert ours.score().mean_iou == pytest.approx(float(value), abs=1e-6)
 
 
-@pytest.mark.filterwarnings("ignore:__array__ implementation")  # of its own, by numpy 2
+@pytest.mark.filterwarnings(
+    "ignore:__array__ implementation"
+)  # a warning of numpy 2 in the library
 @pytest.mark.parametrize("seed", range(4))
 def test_pycocotools_reads_compressed_runs(seed: int) -> None:
     from pycocotools import mask as coco

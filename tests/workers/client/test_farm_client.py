@@ -1,4 +1,4 @@
-"""The farm from outside: submitting, looking, what bad input says, metrics, merging."""
+"""The farm from outside: submit, status, refused input, metrics, merge."""
 
 from __future__ import annotations
 
@@ -56,14 +56,14 @@ def test_a_job_file_that_does_not_fit_is_refused_in_one_line(farm: Farm) -> None
     assert not re.search(r"pydantic|[Ii]nput|\n", str(caught.value))
 
 
-def test_another_recipe_in_the_same_store_is_refused_with_what_differs(farm: Farm) -> None:
+def test_another_recipe_in_the_same_store_is_refused_with_the_differences(farm: Farm) -> None:
     submit(farm)
     with pytest.raises(BadRecipe, match=r"light\.spp: 10 -> 28"):
         farm.submit(HOUSES, new_spec(recipe_from_name("fast")))
     assert len(farm.jobs()) == 1
 
 
-def test_status_counts_what_runs_and_why_says_what_waits(farm: Farm) -> None:
+def test_status_counts_running_tasks_and_why_explains_waiting_ones(farm: Farm) -> None:
     d = submit(farm)
     tasks = d.dispatch()
     d.run(tasks[0])
@@ -82,7 +82,7 @@ def test_status_counts_what_runs_and_why_says_what_waits(farm: Farm) -> None:
         farm.explain(d.job.job_id, "h0/zzz")
 
 
-def test_why_says_what_keeps_a_task_from_running(farm: Farm) -> None:
+def test_why_names_the_obstacle_of_a_task(farm: Farm) -> None:
     d = submit(farm)
     job = d.job.job_id
     d.dispatch()
@@ -102,7 +102,7 @@ def test_why_says_what_keeps_a_task_from_running(farm: Farm) -> None:
     assert because() == "the job is paused: by hand"
 
 
-def test_failures_alike_stand_together(farm: Farm) -> None:
+def test_equal_failures_are_grouped(farm: Farm) -> None:
     d = submit(farm)
     for number, task in enumerate(d.dispatch()):
         fault = Fault(fault="data", fingerprint="data: wall w#", message=f"wall w{number}")
@@ -114,7 +114,7 @@ def test_failures_alike_stand_together(farm: Farm) -> None:
     assert farm.failures(d.job.job_id) == []
 
 
-def test_what_is_not_there_is_one_line(farm: Farm) -> None:
+def test_missing_files_and_jobs_are_one_line(farm: Farm) -> None:
     with pytest.raises(BadInput, match="no job in the ledger"):
         farm.newest_job()
     with pytest.raises(BadInput, match="not in the ledger"):
@@ -157,15 +157,15 @@ def test_the_metrics_endpoint_counts_without_naming_houses(farm: Farm) -> None:
     deploy = Path(__file__).parents[3] / "deploy"
     files = ("grafana-dashboard.json", "prometheus-alerts.yaml")
     shown = "".join((deploy / name).read_text() for name in files)
-    asked = set(re.findall(r"pbrs_[a-z_]+", shown)) - {"pbrs_farm"}
-    told = set(re.findall(r"^# TYPE (pbrs_[a-z_]+)", text, re.MULTILINE)) | {
+    exposed = set(re.findall(r"pbrs_[a-z_]+", shown)) - {"pbrs_farm"}
+    documented = set(re.findall(r"^# TYPE (pbrs_[a-z_]+)", text, re.MULTILINE)) | {
         "pbrs_task_seconds_bucket"
     }
-    assert len(asked) > 8
-    assert asked <= told
+    assert len(exposed) > 8
+    assert exposed <= documented
 
 
-def test_merging_goes_upward_twice_the_same_and_says_what_is_missing() -> None:
+def test_merging_upwards_twice_is_the_same_and_lists_missing_houses() -> None:
     store = MemoryStore()
     spec: JobSpec
     houses, spec = completed(HOUSES, new_spec(recipe_from_name("preview"), rules={"shard_size": 2}))

@@ -1,4 +1,4 @@
-"""What a store holds and nobody needs is found, told, and removed only then."""
+"""Garbage in a store is listed, and removed only on request."""
 
 from __future__ import annotations
 
@@ -49,17 +49,17 @@ def found_of(farm: Farm, keep_s: float = 0.0) -> dict[str, set[str]]:
     return {g.kind: set(g.found) for g in garbage(farm, keep_s, in_an_hour)}
 
 
-def test_what_no_manifest_names_logs_and_cancelled_jobs_may_go(farm: Farm) -> None:
+def test_unreferenced_objects_logs_and_cancelled_jobs_are_garbage(farm: Farm) -> None:
     cancelled = submitted(farm, "a")
     farm.store.put(log_key(cancelled, "a/0/gl", 1), b"log")
     farm.cancel(cancelled)
     put_house(farm, "a", finished=False)
     put_house(farm, "b", finished=True)
-    found = found_of(farm)
-    assert found["logs"] == set()  # they go with their job
-    assert {key.split("/")[1] for key in found["cancelled jobs"]} == {cancelled}
-    left = {keys.view_key("b", "0_0", "left.png")}
-    assert found["named by no manifest"] == left | set(farm.store.list("houses/a/"))
+    listed = found_of(farm)
+    assert listed["logs"] == set()  # logs go with their job
+    assert {key.split("/")[1] for key in listed["cancelled jobs"]} == {cancelled}
+    unreferenced = {keys.view_key("b", "0_0", "left.png")}
+    assert listed["named by no manifest"] == unreferenced | set(farm.store.list("houses/a/"))
     remove(farm, garbage(farm, 0.0, time.time() + 3600))
     assert sorted(farm.store.list("houses/")) == [
         "houses/b/done/house.json", "houses/b/house.json", "houses/b/manifest.jsonl",
@@ -76,7 +76,7 @@ def test_a_job_that_runs_keeps_all_it_has(farm: Farm) -> None:
     assert not any(found_of(farm).values())
 
 
-def test_what_is_younger_than_what_is_kept_stays(farm: Farm) -> None:
+def test_objects_younger_than_the_retention_stay(farm: Farm) -> None:
     put_house(farm, "a", finished=False)
     assert found_of(farm, keep_s=2 * 3600.0)["named by no manifest"] == set()
     assert len(found_of(farm, keep_s=1800.0)["named by no manifest"]) == 3

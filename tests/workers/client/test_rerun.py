@@ -1,4 +1,4 @@
-"""A task that failed on the farm is done once more where its error can be seen."""
+"""A task that failed on the farm is repeated in the foreground, where its error is visible."""
 
 from __future__ import annotations
 
@@ -31,20 +31,20 @@ def test_a_failed_task_is_repeated_by_the_command_that_failures_shows(
     (kind,) = farm.failures(d.job.job_id)
     program, *words = shlex.split(kind["command"])
     assert (program, words[:2]) == ("pbrs-farm", ["rerun", task])
-    # The same error, here; then, mended, the same files as a worker's.
+    # The same error in this process; after the fix, the same files as a worker's.
     assert main(words) == 1
     assert "two walls in one place" in capsys.readouterr().err
     (tmp_path / f"data.{house}").unlink()
     assert main(words) == 0
-    told = capsys.readouterr()
-    assert "rerun: truth" in told.err
-    assert f"{task} done" in told.out
+    output = capsys.readouterr()
+    assert "rerun: truth" in output.err
+    assert f"{task} done" in output.out
     assert any(key.endswith("truth.png") for key in farm.store.list(f"houses/{house}/"))
-    # The ledger learns it by `retry` alone.
+    # Only `retry` updates the ledger.
     assert farm.view(d.job.job_id).n_failed == 1
 
 
-def test_geometry_gets_what_was_submitted_and_an_unknown_task_is_told(farm: Farm) -> None:
+def test_geometry_gets_the_submitted_house_and_an_unknown_task_is_refused(farm: Farm) -> None:
     d = submit(farm)
     steps: list[str] = []
     with pytest.raises(BadInput, match=r"not admitted|no such"):

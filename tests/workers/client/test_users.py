@@ -1,4 +1,4 @@
-"""A farm with users: who asks, what he may, and the line that says what he did."""
+"""A farm with users: identity, permissions, and the log line of each order."""
 
 from __future__ import annotations
 
@@ -35,14 +35,14 @@ def submit(farm: Farm, house: str = "h0", **fields: object) -> str:
 
 @pytest.fixture
 def team(farm: Farm) -> dict[str, Farm]:
-    """The farm as its admin, two users and a stranger see it."""
-    found = {"root": with_token(farm, add_user(farm, "root", {}))}
+    """The farm as seen by its admin, two users and a stranger."""
+    farms = {"root": with_token(farm, add_user(farm, "root", {}))}
     for name in ("ann", "bob"):
-        found[name] = with_token(farm, add_user(found["root"], name, {}))
-    return found | {"nobody": farm, "stranger": with_token(farm, "x" * 32)}
+        farms[name] = with_token(farm, add_user(farms["root"], name, {}))
+    return farms | {"nobody": farm, "stranger": with_token(farm, "x" * 32)}
 
 
-def test_a_user_steers_his_own_jobs_an_admin_all_and_each_order_leaves_a_line(
+def test_a_user_steers_his_jobs_an_admin_all_and_each_order_is_logged(
     team: dict[str, Farm],
 ) -> None:
     job = submit(team["ann"])
@@ -59,8 +59,8 @@ def test_a_user_steers_his_own_jobs_an_admin_all_and_each_order_leaves_a_line(
     with pytest.raises(BadInput, match="only an admin may"):
         team["ann"].drain("w1")
     lines = team["nobody"].users.changes(9)
-    told = [(row["user"], row["what"]) for row in lines if row["of"] == job]
-    assert told == [("root", "resume"), ("ann", "pause"), ("ann", "submit")]
+    orders = [(row["user"], row["what"]) for row in lines if row["of"] == job]
+    assert orders == [("root", "resume"), ("ann", "pause"), ("ann", "submit")]
 
 
 def test_who_may_not_submits_no_urgent_job(team: dict[str, Farm]) -> None:
@@ -87,7 +87,7 @@ def test_users_outlive_a_redis_that_lost_them_and_one_admin_stays(team: dict[str
     assert [row["user"] for row in user_rows(root)] == ["ann", "root"]
 
 
-def test_the_verb_prints_a_token_once_and_refuses_what_is_no_quota(
+def test_the_verb_prints_a_token_once_and_refuses_invalid_quotas(
     farm: Farm, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
     monkeypatch.setenv("PBRS_REDIS_URL", farm.config.redis_url.reveal())
@@ -96,9 +96,9 @@ def test_the_verb_prints_a_token_once_and_refuses_what_is_no_quota(
     assert main(["users"]) == 0
     assert "checks no tokens" in capsys.readouterr().out
     assert main(["users", "add", "root"]) == 0
-    found = re.fullmatch(r"root's token, not stored: (\S{32})\n", capsys.readouterr().out)
-    assert found is not None
-    monkeypatch.setenv("PBRS_TOKEN", found[1])
+    match = re.fullmatch(r"root's token, not stored: (\S{32})\n", capsys.readouterr().out)
+    assert match is not None
+    monkeypatch.setenv("PBRS_TOKEN", match[1])
     assert main(["users", "add", "ann", "--share", "2", "--slot-hours", "9"]) == 0
     for words in (["add", "Ann B"], ["add", "ann"], ["limit", "ann"], ["limit", "bo", "--share", "0"],
                   ["limit", "ann", "--slot-hours", "nan"], ["remove", "an"], ["add"]):  # fmt: skip
@@ -107,8 +107,8 @@ def test_the_verb_prints_a_token_once_and_refuses_what_is_no_quota(
     assert main(["users", "--json"]) == 0
     text = capsys.readouterr().out
     assert '"slot_hours": 9.0' in text
-    assert found[1] not in text
+    assert match[1] not in text
     assert main(["audit"]) == 0
     assert "users add" in capsys.readouterr().out
     stored = farm.store.get("jobs/users.json").decode()
-    assert found[1] not in stored
+    assert match[1] not in stored

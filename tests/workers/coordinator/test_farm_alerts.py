@@ -1,4 +1,4 @@
-"""Trouble of a farm is posted once when it begins and once when it is over."""
+"""Trouble on a farm is posted once when it begins and once when it ends."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ JOB = "0" * 12
 
 
 class Watch:
-    """Alerts with a clock of their own, and what they posted."""
+    """Alerts with a fake clock, and their posts."""
 
     def __init__(self) -> None:
         self.clock = FakeClock()
@@ -45,17 +45,17 @@ class Watch:
 
 def test_a_share_of_failed_attempts_is_posted_and_its_end() -> None:
     watch = Watch()
-    assert watch.look(done_gl=100, failures_bug=50) == []  # of former times
+    assert watch.look(done_gl=100, failures_bug=50) == []  # from before the coordinator started
     assert watch.look(done_gl=108, failures_bug=52) == []
     assert watch.look(done_gl=108, failures_bug=60) == [(f"failures of job {JOB}", "begins")]
     assert watch.look(done_gl=109, failures_bug=60) == []
     for _ in range(12):
-        found = watch.look(done_gl=300, failures_bug=60)
+        posts = watch.look(done_gl=300, failures_bug=60)
     assert watch.posted[-1] == (f"failures of job {JOB}", "over")
-    assert found == []
+    assert posts == []
 
 
-def test_few_failures_say_nothing() -> None:
+def test_few_failures_post_nothing() -> None:
     watch = Watch()
     watch.look()
     assert watch.look(failures_crash=9) == []
@@ -70,13 +70,13 @@ def test_a_worker_that_died_is_posted() -> None:
     assert watch.look(silent_s=80.0) == [("lost worker w1", "begins")]
 
 
-def test_tasks_that_wait_while_none_ends_are_posted() -> None:
+def test_waiting_tasks_are_posted_if_none_ends() -> None:
     watch = Watch()
     watch.look(gl_q=5, done_gl=3)
     assert watch.look(1700, gl_q=5, done_gl=3) == []
     assert watch.look(200, gl_q=5, done_gl=3) == [(f"stuck job {JOB}", "begins")]
     assert watch.look(gl_q=4, done_gl=4) == [(f"stuck job {JOB}", "over")]
-    # A job that stands paused, and one of which nothing waits, is not stuck.
+    # A paused job, and a job without ready tasks, is not stuck.
     assert watch.look(4000, state="paused", gl_q=4, done_gl=4) == []
     assert watch.look(4000, done_gl=4, gl_r=1) == []
 

@@ -1,4 +1,4 @@
-"""The coordinator with a ledger in memory: one leads, sends within its window, resends what is lost."""
+"""The coordinator with a ledger in memory: one leads, sends within its window, resends lost tasks."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ JOB = "0" * 12
 
 
 class Bench:
-    """A coordinator, and the messages it has sent."""
+    """A coordinator and its sent messages."""
 
     def __init__(self, folder: Path) -> None:
         self.clock = FakeClock()
@@ -59,7 +59,7 @@ def test_ready_tasks_are_sent_to_their_queues(bench: Bench) -> None:
     assert bench.sent[-1][0] == "light.gpu"
 
 
-def test_the_window_grows_with_the_slots_and_holds_what_is_in_flight(bench: Bench) -> None:
+def test_the_window_grows_with_the_slots_and_bounds_tasks_in_flight(bench: Bench) -> None:
     bench.ledger.ready = [f"h{k}/-/geometry" for k in range(20)]
     assert [bench.coordinator.turn() for _ in range(2)] == [3, 0]
     bench.registry.n_slots = {"geometry": 4}
@@ -68,12 +68,12 @@ def test_the_window_grows_with_the_slots_and_holds_what_is_in_flight(bench: Benc
 
 
 def test_only_the_leader_sends_and_the_next_takes_over(bench: Bench) -> None:
-    other = bench.another()
+    successor = bench.another()
     assert bench.coordinator.turn() == 0
     bench.ledger.ready = ["h0/-/geometry"]
-    assert (other.turn(), other.leading) == (0, False)
+    assert (successor.turn(), successor.leading) == (0, False)
     bench.ledger.leader = ""
-    assert (other.turn(), other.leading) == (1, True)
+    assert (successor.turn(), successor.leading) == (1, True)
     assert (bench.coordinator.turn(), bench.coordinator.leading) == (0, False)
 
 
@@ -122,7 +122,7 @@ def test_redis_away_is_no_end_and_leaving_gives_up_the_lead(
     assert bench.ledger.leader == ""
 
 
-def test_short_tasks_of_one_house_go_in_one_message_as_long_as_each_slot_gets_some(
+def test_short_tasks_of_one_house_share_a_message_if_each_slot_gets_some(
     bench: Bench, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     seconds = {"gl": 0.5, "light": 20.0}
@@ -137,12 +137,12 @@ def test_short_tasks_of_one_house_go_in_one_message_as_long_as_each_slot_gets_so
         pass
     sent = [task for _queue, _job, task, _recipe in bench.sent]
     assert next(task for task in sent if task.endswith("gl")).startswith("h0/0,1")
-    # Long ones, and those of which nobody knows yet, go one by one.
+    # Long tasks, and those of unknown length, are sent one by one.
     assert all("," not in task for task in sent if not task.endswith("gl"))
     assert len([task for task in sent if task.endswith("light")]) > 0
 
 
-def test_a_job_s_ceiling_bounds_what_is_in_flight(bench: Bench) -> None:
+def test_a_jobs_ceiling_bounds_its_tasks_in_flight(bench: Bench) -> None:
     bench.ledger.fields["max_slots"] = "2"
     bench.registry.n_slots = {"gl": 50, "light": 50}
     bench.ledger.ready = [f"h0/{k}/gl" for k in range(5)]

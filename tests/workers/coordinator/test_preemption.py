@@ -9,7 +9,7 @@ from workers.ledger.task_ledger import Hold, JobView, WorkerView
 
 
 def job(name: str, user: str = "", *, urgent: bool = False, **counts: float) -> JobView:
-    """counts: light_w=3 are three ready tasks of light."""
+    """counts: light_w=3 means three ready tasks of light."""
     fields = {"state": "running", "user": user, "preempt": str(int(urgent)), "priority": "5"}
     return JobView(name, fields, {k.replace("_", ":"): n for k, n in counts.items()}, {}, 0)
 
@@ -29,7 +29,7 @@ def test_as_many_slots_are_taken_as_wait_but_for_free_ones_and_those_that_end_al
     holds = {"a": [hold("a", k, marked=k < n_marked) for k in range(4)], "u": []}
     views = [job("a"), job("u", urgent=True, light_q=2)]
     chosen = choose_victims(views, holds.__getitem__, [worker("w1", 4 + n_free)])
-    # What began last has lost least.
+    # The youngest task has lost the least.
     assert [h.token for h in chosen] == [f"a{3 - k}" for k in range(expected)]
 
 

@@ -19,12 +19,12 @@ def test_rates_and_time_left_follow_the_counts() -> None:
     now = rates.update(view(20, {}), 10.0)
     assert now["gl"] == pytest.approx(2.0)
     gl = next(s for s in stage_views(view(4, now), {"gl": 2}) if s.stage == "gl")
-    assert gl.total == 20  # 8 batches of 4 houses, 2 a house for the 6 to come
+    assert gl.total == 20  # 8 batches of 4 houses, plus 2 for each of the 6 houses to come
     assert gl.eta_s == pytest.approx(16 / 2.0)
     assert gl.p50_s == 8.0
 
 
-def test_houses_given_up_and_stages_unknown_expect_nothing() -> None:
+def test_abandoned_houses_and_unknown_stages_add_no_time() -> None:
     fields = {"n_houses": "2", "stages": "gl,light", "shard_size": "500", "state": "running"}
     start = {s.stage: s for s in stage_views(JobView("j", fields, {}, {}, 0), {})}
     assert (start["gl"].total, start["gl"].eta_s) == (0, None)
@@ -42,5 +42,5 @@ def test_a_quantile_is_the_upper_end_of_its_bucket() -> None:
 
 
 def test_durations_read_well() -> None:
-    told = [duration_text(s) for s in (None, 0.5, 42, 600, 7200, 200_000)]
-    assert told == ["-", "0.5s", "42s", "10m", "2.0h", "2.3d"]
+    texts = [duration_text(s) for s in (None, 0.5, 42, 600, 7200, 200_000)]
+    assert texts == ["-", "0.5s", "42s", "10m", "2.0h", "2.3d"]

@@ -1,4 +1,4 @@
-"""The user with the least load is next, his most urgent job is fed first, and none waits for ever."""
+"""The user with the least load is next, his most urgent job is fed first, and nobody starves."""
 
 from __future__ import annotations
 
@@ -16,17 +16,17 @@ def job(name: str, priority: int, ready: int = 1000, state: str = "running") -> 
 
 
 def sent(turns: MessageTurns, views: list[JobView], n_turns: int, room: int = 1) -> Counter[str]:
-    """Job -> tasks of light that were sent in so many turns."""
+    """Job -> tasks of light sent in n_turns turns."""
     n: Counter[str] = Counter()
     for _ in range(n_turns):
-        for name, given in turns.split({"light": room}, views).items():
-            turns.charge("light", name, given["light"])
-            n[name] += given["light"]
+        for name, quota in turns.split({"light": room}, views).items():
+            turns.charge("light", name, quota["light"])
+            n[name] += quota["light"]
     return n
 
 
 @pytest.mark.parametrize("room", [1, 4, 50])
-def test_nine_tasks_of_the_urgent_job_are_sent_for_one_of_the_other(room: int) -> None:
+def test_the_urgent_job_gets_nine_tasks_for_one_of_the_other(room: int) -> None:
     views = [job("a", 2), job("b", 7)]
     assert sent(MessageTurns(), views, 100 // room, room) == {"a": 90, "b": 10}
 
@@ -42,9 +42,9 @@ def test_of_ten_priorities_the_last_gets_something() -> None:
     assert min(n.values()) >= 5
 
 
-def test_what_the_urgent_job_has_not_goes_to_the_other() -> None:
-    given = MessageTurns().split({"light": 8}, [job("a", 0, ready=3), job("b", 9)])
-    assert (given["a"]["light"], given["b"]["light"]) == (3, 5)
+def test_unused_quota_of_the_urgent_job_goes_to_the_other() -> None:
+    quotas = MessageTurns().split({"light": 8}, [job("a", 0, ready=3), job("b", 9)])
+    assert (quotas["a"]["light"], quotas["b"]["light"]) == (3, 5)
 
 
 def test_a_changed_priority_counts_at_the_next_task() -> None:
@@ -59,31 +59,31 @@ def test_a_job_that_comes_late_owes_and_is_owed_nothing() -> None:
     assert sent(turns, [job("a", 5), job("b", 5)], 11) == {"a": 6, "b": 5}
 
 
-def test_light_on_a_gpu_has_a_room_of_its_own() -> None:
+def test_light_on_a_gpu_has_a_separate_window() -> None:
     gpu = JobView("g", {"state": "running", "gpu": "1"}, {"light:w": 9}, {}, 0)
-    given = MessageTurns().split({"light": 4, "light.gpu": 2}, [job("a", 5), gpu])
-    assert given == {"a": {"light": 4, "light.gpu": 0}, "g": {"light": 0, "light.gpu": 2}}
+    quotas = MessageTurns().split({"light": 4, "light.gpu": 2}, [job("a", 5), gpu])
+    assert quotas == {"a": {"light": 4, "light.gpu": 0}, "g": {"light": 0, "light.gpu": 2}}
 
 
 def test_a_paused_job_gets_nothing() -> None:
-    given = MessageTurns().split({"light": 4}, [job("a", 0, state="paused"), job("b", 5)])
-    assert (given["a"]["light"], given["b"]["light"]) == (0, 4)
+    quotas = MessageTurns().split({"light": 4}, [job("a", 0, state="paused"), job("b", 5)])
+    assert (quotas["a"]["light"], quotas["b"]["light"]) == (0, 4)
 
 
 def of_user(name: str, user: str = "", *, urgent: bool = False, **counts: float) -> JobView:
-    """counts: light_w=3 are three ready tasks of light."""
+    """counts: light_w=3 means three ready tasks of light."""
     fields = {"state": "running", "user": user, "preempt": str(int(urgent)), "priority": "5"}
     return JobView(name, fields, {k.replace("_", ":"): n for k, n in counts.items()}, {}, 0)
 
 
 def split(views: list[JobView], room: int, window: int, **shares: float) -> dict[str, int]:
-    found = MessageTurns().split(
+    quotas = MessageTurns().split(
         {"light": room}, views, windows={"light": window}, share_of=lambda u: shares.get(u, 1.0)
     )
-    return {name: pools["light"] for name, pools in found.items()}
+    return {name: pools["light"] for name, pools in quotas.items()}
 
 
-def test_users_have_equal_shares_whatever_the_number_and_priority_of_their_jobs() -> None:
+def test_users_have_equal_shares_for_any_number_and_priority_of_jobs() -> None:
     views = [of_user(f"a{k}", "ann", light_w=90) for k in range(3)] + [
         of_user("b", "bob", light_w=90)
     ]
@@ -92,22 +92,22 @@ def test_users_have_equal_shares_whatever_the_number_and_priority_of_their_jobs(
     assert [n[f"a{k}"] for k in range(3)] == [10, 10, 10]
 
 
-def test_a_user_of_three_shares_has_three_tasks_for_one_of_the_other() -> None:
+def test_a_user_of_three_shares_gets_three_tasks_for_one_of_the_other() -> None:
     n = split([of_user("a", "ann", light_w=90), of_user("b", "bob", light_w=90)], 40, 40, ann=3.0)
     assert n == {"a": 30, "b": 10}
 
 
-def test_who_comes_late_may_fill_his_share_of_a_window_that_is_full() -> None:
+def test_a_late_user_may_fill_his_share_of_a_full_window() -> None:
     views = [of_user("a", "ann", light_w=90, light_q=8, light_r=8), of_user("b", "bob", light_w=90)]
     assert split(views, 0, 16) == {"a": 0, "b": 8}
 
 
-def test_what_is_free_goes_to_who_holds_less_and_none_is_left_over() -> None:
+def test_free_slots_go_to_users_with_fewer_until_none_is_left() -> None:
     views = [of_user("a", "ann", light_w=90, light_r=4), of_user("b", "bob", light_w=2, light_r=1)]
     assert split(views, 6, 11) == {"a": 4, "b": 2}
 
 
-def test_an_urgent_job_fills_the_window_first_even_where_it_is_full() -> None:
+def test_an_urgent_job_fills_a_full_window_first() -> None:
     views = [
         of_user("a", "ann", light_w=9, light_q=10),
         of_user("u", "bob", urgent=True, light_w=30),
@@ -124,29 +124,29 @@ def test_users_are_served_by_what_they_hold_over_their_share() -> None:
         return waiting[user] > 0
 
     served = loads.serve(list(waiting), has_more)
-    # Loads of 4/3, 1 and 0: cyd, then bob until his two are more than four or five thirds.
+    # Loads of 4/3, 1 and 0: cyd first, then bob until his two exceed four or five thirds.
     assert [next(served) for _ in range(5)] == ["cyd", "bob", "ann", "ann", "bob"]
     assert loads.held == {"ann": 6, "bob": 3, "cyd": 1}
 
 
-def test_a_waiting_user_goes_before_only_where_that_mends_more_than_a_slot() -> None:
+def test_a_waiting_user_goes_first_only_if_he_is_behind_by_more_than_a_slot() -> None:
     loads = Loads(Counter(ann=5, bob=4, cyd=1), lambda _user: 1.0)
     assert loads.find_users_before("ann", ["bob", "cyd", "dan"]) == ["cyd", "dan"]
     assert loads.find_users_before("dan", ["ann", "cyd"]) == []
 
 
-def test_jobs_of_who_holds_more_leave_what_comes_to_who_waits_and_only_there() -> None:
+def test_a_user_above_his_share_leaves_contested_slots_to_waiting_users() -> None:
     ann, bob = of_user("a", "ann", gl_r=4, gl_q=5), of_user("b", "bob", gl_r=1, light_q=2)
     assert find_blocked_jobs([ann, bob], {}, {}) == {
         "a": Block(("light",), "tasks of bob go first", at_once=False)
     }
-    # By shares, and never because of somebody who has nothing that waits.
+    # Divided by shares; a user without ready tasks blocks nobody.
     assert find_blocked_jobs([ann, bob], {"ann": User("ann", share=3.0)}, {}) == {}
     assert find_blocked_jobs([ann, of_user("b", "bob", light_w=2)], {}, {}) == {}
     assert find_blocked_jobs([ann, of_user("a2", "ann", light_q=9)], {}, {}) == {}
-    # Who has nothing goes first, and one slot more or less is no matter.
-    one, two = of_user("a", "ann", geometry_r=1), of_user("a", "ann", geometry_r=2)
-    assert find_blocked_jobs([one, of_user("b", "bob", light_q=2)], {}, {}).keys() == {"a"}
+    # A user who holds no slot goes first, and a difference of one slot is ignored.
+    first, two = of_user("a", "ann", geometry_r=1), of_user("a", "ann", geometry_r=2)
+    assert find_blocked_jobs([first, of_user("b", "bob", light_q=2)], {}, {}).keys() == {"a"}
     assert find_blocked_jobs([two, of_user("b", "bob", geometry_r=1, light_q=2)], {}, {}) == {}
 
 
@@ -158,7 +158,7 @@ def test_an_urgent_job_that_waits_goes_before_all_others() -> None:
 def test_spent_slot_hours_hold_every_job_of_their_user_back() -> None:
     views = [of_user("a", "ann", gl_q=1), of_user("b", "bob", gl_q=1)]
     users = {"ann": User("ann", slot_hours=2.0), "bob": User("bob", slot_hours=2.0)}
-    found = find_blocked_jobs(views, users, {"ann": 2.0, "bob": 1.9})
-    assert found.keys() == {"a"}
-    assert found["a"].queues == (EVERYWHERE,)
-    assert "ann has used 2 of 2 slot-hours" in found["a"].why
+    blocked = find_blocked_jobs(views, users, {"ann": 2.0, "bob": 1.9})
+    assert blocked.keys() == {"a"}
+    assert blocked["a"].queues == (EVERYWHERE,)
+    assert "ann has used 2 of 2 slot-hours" in blocked["a"].why

@@ -1,4 +1,4 @@
-"""A webhook gets one post for each end and each pause, whoever leads."""
+"""A webhook gets one post for each end and each pause, whichever coordinator leads."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def view(ledger: MemoryLedger, state: str, **counts: float) -> JobView:
 
 
 class Listener:
-    """Takes posts, or fails so often first."""
+    """Takes posts after failing a given number of times."""
 
     def __init__(self, n_failures: int = 0) -> None:
         self.rows: list[dict[str, Any]] = []
@@ -38,7 +38,7 @@ class Listener:
         self.rows.append(row)
 
 
-def test_an_end_is_posted_once_whoever_leads() -> None:
+def test_an_end_is_posted_once_whichever_coordinator_leads() -> None:
     ledger, heard = MemoryLedger(), Listener()
     for _leader in range(2):
         webhook = Webhook(ledger, heard)
@@ -57,13 +57,13 @@ def test_a_job_that_runs_again_is_posted_again() -> None:
     assert [row["state"] for row in heard.rows] == ["paused", "paused", "done"]
 
 
-def test_a_job_with_failures_says_how_many() -> None:
+def test_a_job_with_failures_posts_their_number() -> None:
     row = notice(view(MemoryLedger(), "done", **{"geometry:f": 2, "views": 7, "houses:done": 1}))
     assert row["state"] == "done with failures"
     assert row["text"].endswith("done with failures; 1 of 3 houses, 7 views, 2 tasks failed")
 
 
-def test_a_url_that_does_not_answer_is_asked_again_and_not_for_ever() -> None:
+def test_a_silent_url_is_retried_up_to_a_limit() -> None:
     ledger, heard = MemoryLedger(), Listener(n_failures=2)
     webhook = Webhook(ledger, heard)
     for _look in range(5):

@@ -43,7 +43,7 @@ def test_a_message_delivered_twice_runs_once(ledger: RedisLedger) -> None:
     assert d.claim(task, "w2").verdict == "done"
 
 
-def test_a_claim_whose_answer_was_lost_may_be_asked_again(ledger: RedisLedger) -> None:
+def test_a_claim_with_a_lost_answer_may_be_repeated(ledger: RedisLedger) -> None:
     d = drive(ledger, 1)
     (task,) = d.dispatch()
     assert d.claim(task) == d.claim(task)
@@ -57,7 +57,7 @@ def test_the_attempt_is_counted_before_the_work(ledger: RedisLedger) -> None:
     assert ledger.task_facts(d.job.job_id, task)["attempts"] == "1"
 
 
-def test_light_on_a_gpu_is_leased_apart_so_that_each_kind_of_worker_scales_by_its_own(
+def test_gpu_light_is_leased_separately_so_that_workers_of_each_kind_scale(
     ledger: RedisLedger,
 ) -> None:
     d = drive(ledger, 1, gpu=True)
@@ -65,13 +65,13 @@ def test_light_on_a_gpu_is_leased_apart_so_that_each_kind_of_worker_scales_by_it
     for task in d.dispatch():
         d.run(task)
     task = d.dispatch()[0]
-    held = d.claim(task, "w1")
+    claim = d.claim(task, "w1")
     sizes = [
         ledger.client.zcard(f"{ledger.config.prefix}lease:{name}")
         for name in ("light", "light.gpu")
     ]
-    assert (held.verdict, sizes) == ("run", [0, 1])
-    assert ledger.heartbeat(d.job.job_id, [task], held.token) == "ok"
+    assert (claim.verdict, sizes) == ("run", [0, 1])
+    assert ledger.heartbeat(d.job.job_id, [task], claim.token) == "ok"
     time.sleep(0.35)
     assert ledger.reap(d.leader) == 1
     assert ledger.client.zcard(f"{ledger.config.prefix}lease:light.gpu") == 0
@@ -131,7 +131,7 @@ def test_tasks_of_a_house_are_claimed_and_finished_together_each_with_its_fence(
     claims = ledger.claim_many(d.job.job_id, tasks, token="t", recipe=recipe)
     assert [(c.verdict, c.detail) for c in claims] == [("run", "1"), ("run", "1")]
     assert d.counts["gl:r"] == 2
-    # The first is lost meanwhile, and somebody else's; the second is finished all the same.
+    # The first lease expires and another worker takes the task; the second is finished anyway.
     d.fail(tasks[0], claims[0], "preempted")
     ledger.finish_many(d.job.job_id, {t: Finished(1.0, n_views=1) for t in tasks}, "t")
     assert d.counts["done:gl"] == 1
@@ -143,7 +143,7 @@ def test_tasks_of_a_house_are_claimed_and_finished_together_each_with_its_fence(
     assert d.state == "done"
 
 
-def test_a_task_that_failed_is_claimed_by_itself(ledger: RedisLedger) -> None:
+def test_a_failed_task_is_claimed_in_a_message_with_no_other(ledger: RedisLedger) -> None:
     d = drive(ledger, 1)
     d.run(d.dispatch()[0])
     first, second = d.dispatch()
@@ -161,7 +161,7 @@ def test_a_task_that_failed_is_claimed_by_itself(ledger: RedisLedger) -> None:
     assert verdicts(first) == ["run"]
 
 
-def test_a_failed_task_lets_nobody_run_beside_it(ledger: RedisLedger) -> None:
+def test_a_failed_task_runs_with_no_other(ledger: RedisLedger) -> None:
     d = drive(ledger, 1)
     d.run(d.dispatch()[0])
     first, second = d.dispatch()
@@ -176,7 +176,7 @@ def test_a_failed_task_lets_nobody_run_beside_it(ledger: RedisLedger) -> None:
 @pytest.mark.parametrize(
     ("n_waiting", "queues"), [(1, ("gl", "light")), (0, ("gl", "light")), (1, ("gl",))]
 )
-def test_a_slot_goes_on_with_its_house_where_others_are_busy(
+def test_a_slot_continues_with_its_house_if_others_are_busy(
     ledger: RedisLedger, n_waiting: int, queues: tuple[str, ...]
 ) -> None:
     d = drive(ledger, 1)
@@ -189,7 +189,7 @@ def test_a_slot_goes_on_with_its_house_where_others_are_busy(
     ends = {task: Finished(0.1, n_views=1) for task in tasks}
     claimed = ledger.finish_many(d.job.job_id, ends, "t", GoOn(recipe, queues))
     light = [task.replace("/gl", "/light") for task in tasks]
-    # Nobody knows yet how long light takes: one at first.
+    # The duration of light is still unknown: one task at first.
     goes_on = bool(n_waiting) and "light" in queues
     assert list(claimed) == (light[:1] if goes_on else [])
     assert d.dispatch() == (light[1:] if goes_on else light)

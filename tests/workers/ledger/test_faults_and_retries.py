@@ -1,4 +1,4 @@
-"""Three attempts, quarantine, cooldown: what the ledger does with faults; against a real Redis."""
+"""Three attempts, quarantine, cooldown: the ledger's answer to faults; against a real Redis."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.worker_registry import Registry
 
 
-def test_three_attempts_then_the_batch_fails_and_the_house_goes_on(ledger: RedisLedger) -> None:
+def test_after_three_attempts_the_batch_fails_and_the_house_continues(ledger: RedisLedger) -> None:
     d = drive(ledger, 1)
     d.run(d.dispatch()[0])
     answers = []
@@ -60,7 +60,7 @@ def test_most_batches_failing_quarantines_the_house_and_cancels_the_rest(
 
 
 @pytest.mark.parametrize("kind", ["preempted", "storage"])
-def test_what_is_nobodys_fault_is_not_counted(ledger: RedisLedger, kind: str) -> None:
+def test_faults_of_the_machine_are_not_counted(ledger: RedisLedger, kind: str) -> None:
     d = drive(ledger, 1)
     (task,) = d.dispatch()
     for _ in range(5):

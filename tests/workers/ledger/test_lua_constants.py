@@ -1,4 +1,4 @@
-"""What Lua and Python must agree on stands once, in Python."""
+"""Constants shared by Lua and Python are defined once, in Python."""
 
 import re
 from pathlib import Path
@@ -10,19 +10,19 @@ from workers.ids import STAGES
 from workers.ledger.task_ledger import ALIVE_S, STATES
 
 SCRIPTS = sorted(Path(ledger.__file__).with_name("lua").glob("*.lua"))
-# Words that mean something else beside a stage: a key in Redis, an order that `steer` takes.
+# Words that are a stage and something else: a key in Redis, an order that `steer` takes.
 OTHER_WORDS = {"job"}, {"steer": {"reduce"}}
 
 
-def test_lua_is_told_the_states_the_stages_and_when_a_worker_is_there() -> None:
-    told = ledger.lua_constants()
-    assert f"local ALIVE_S = {ALIVE_S:g}\n" in told
-    assert all(f"local {name} = '{letter}'\n" in told for name, letter in STATES.items())
-    assert all(f"local {stage.upper()}_STAGE = '{stage}'\n" in told for stage in STAGES)
+def test_lua_gets_the_states_the_stages_and_the_age_of_live_workers() -> None:
+    constants = ledger.lua_constants()
+    assert f"local ALIVE_S = {ALIVE_S:g}\n" in constants
+    assert all(f"local {name} = '{letter}'\n" in constants for name, letter in STATES.items())
+    assert all(f"local {stage.upper()}_STAGE = '{stage}'\n" in constants for stage in STAGES)
 
 
 @pytest.mark.parametrize("script", SCRIPTS, ids=lambda path: path.stem)
-def test_no_script_has_a_stage_a_state_or_a_workers_age_of_its_own(script: Path) -> None:
+def test_no_script_defines_a_stage_a_state_or_a_workers_age(script: Path) -> None:
     code = re.sub(r"--.*", "", script.read_text())
     words = set(re.findall(r"'([^']*)'", code))
     keys, orders = OTHER_WORDS

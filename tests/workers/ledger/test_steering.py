@@ -1,4 +1,4 @@
-"""Pausing, cancelling, draining, and a ledger built again from storage; against a real Redis."""
+"""Pausing, cancelling, draining, and a ledger rebuilt from storage; against a real Redis."""
 
 from __future__ import annotations
 
@@ -120,7 +120,7 @@ def test_a_lost_message_is_sent_again(ledger: RedisLedger) -> None:
     assert ledger.resend(d.job.job_id, d.leader, "geometry", 0.0) == []
 
 
-def test_the_window_bounds_what_is_in_flight(ledger: RedisLedger) -> None:
+def test_the_window_bounds_tasks_in_flight(ledger: RedisLedger) -> None:
     d = drive(ledger, 50)
     ledger.lead(d.leader)
     room = {**ROOM, "geometry": 7}
@@ -130,7 +130,7 @@ def test_the_window_bounds_what_is_in_flight(ledger: RedisLedger) -> None:
     assert d.counts["houses:open"] == 20
 
 
-def test_a_ledger_rebuilt_from_storage_goes_on_where_it_was(ledger: RedisLedger) -> None:
+def test_a_ledger_rebuilt_from_storage_continues(ledger: RedisLedger) -> None:
     job = spec(3, "ba9876543210")
     ledger.create(job)
     ledger.load_houses(
@@ -156,7 +156,9 @@ def test_a_ledger_rebuilt_from_storage_goes_on_where_it_was(ledger: RedisLedger)
     counts = d.counts
     assert counts["done:light"] == counts["done:gl"] == counts["batches"] == 6
     assert counts["done:geometry"] == counts["done:reduce"] == counts["houses:done"] == 3
-    assert counts["views"] == 5 + 3  # five were stored; Drive tells of one a batch it runs
+    assert (
+        counts["views"] == 5 + 3
+    )  # five are stored; Drive reports one for each batch that it runs
 
 
 def test_a_partial_reduction_does_not_end_the_job(ledger: RedisLedger) -> None:
@@ -178,11 +180,11 @@ def test_forgetting_leaves_no_key(ledger: RedisLedger) -> None:
     d = drive(ledger, 3)
     d.claim(d.dispatch()[0])
     ledger.forget(d.job.job_id)
-    left = list(ledger.client.scan_iter(f"{ledger.config.prefix}*"))
-    assert set(left) == {ledger.config.prefix + name for name in ("leader", "notify")}
+    keys = list(ledger.client.scan_iter(f"{ledger.config.prefix}*"))
+    assert set(keys) == {ledger.config.prefix + name for name in ("leader", "notify")}
 
 
-def test_redis_away_or_wrong_password_is_one_line_without_it(config: FarmConfig) -> None:
+def test_redis_away_or_wrong_password_is_one_line_without_the_password(config: FarmConfig) -> None:
     away = replace(config, redis_url=Secret("redis://:hush@127.0.0.1:1/0"))
     with pytest.raises(LedgerUnavailable, match="no Redis at redis://127") as caught:
         RedisLedger(away).ping()
@@ -190,7 +192,7 @@ def test_redis_away_or_wrong_password_is_one_line_without_it(config: FarmConfig)
     assert "\n" not in str(caught.value)
 
 
-def test_a_service_waits_for_redis_but_not_where_it_is_refused(
+def test_a_service_waits_for_redis_unless_it_is_refused(
     config: FarmConfig, redis_server: RedisServer
 ) -> None:
     tries = []

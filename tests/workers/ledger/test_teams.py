@@ -1,4 +1,4 @@
-"""What the ledger does for teams: who goes first, what a user spent, tasks that make room."""
+"""Teams in the ledger: order of users, slot-hours spent, preempted tasks."""
 
 from __future__ import annotations
 
@@ -21,7 +21,7 @@ def of_user(ledger: RedisLedger, user: str) -> Drive:
     return Drive(ledger, job)
 
 
-def test_a_worker_may_not_claim_of_a_job_that_is_blocked_on_one_of_its_queues(
+def test_a_worker_may_not_claim_from_a_job_blocked_on_one_of_its_queues(
     ledger: RedisLedger,
 ) -> None:
     d = drive(ledger, 1)
@@ -42,9 +42,7 @@ def test_a_worker_may_not_claim_of_a_job_that_is_blocked_on_one_of_its_queues(
     assert view.blocked_queues == ()
 
 
-def test_a_job_that_is_blocked_everywhere_goes_on_with_no_batch_of_its_house(
-    ledger: RedisLedger,
-) -> None:
+def test_a_fully_blocked_job_starts_no_batch_of_its_house(ledger: RedisLedger) -> None:
     d = drive(ledger, 1)
     d.run(d.dispatch()[0])
     first, _second = d.dispatch()
@@ -54,12 +52,12 @@ def test_a_job_that_is_blocked_everywhere_goes_on_with_no_batch_of_its_house(
     assert ledger.finish_many(JOB_ID, {first: Finished(9.0)}, claim.token, go_on) == {}
 
 
-def test_what_a_user_s_tasks_took_is_counted_and_nobody_else_s(ledger: RedisLedger) -> None:
+def test_slot_seconds_are_counted_for_the_tasks_user_only(ledger: RedisLedger) -> None:
     table = UserTable(ledger)
     d = of_user(ledger, "ann")
     d.run_all()
     drive(ledger, 1, job_id="ba9876543210").run_all()
-    n = sum(d.ran.values())  # each of a second
+    n = sum(d.ran.values())  # one second each
     assert table.spent_h() == {"ann": pytest.approx(n / 3600)}
 
 
@@ -68,13 +66,13 @@ def test_a_task_that_makes_room_ends_at_its_heartbeat_and_keeps_its_attempts(
 ) -> None:
     d = drive(ledger, 2)
     first, second = d.dispatch()
-    claim, other = d.claim(first), d.claim(second)
-    (held,) = [hold for hold in ledger.holds(JOB_ID) if hold.task == first]
-    assert ledger.preempt(JOB_ID, "nobody", [held]) == -1
-    assert [ledger.preempt(JOB_ID, d.leader, [held]) for _ in range(2)] == [1, 0]
+    claim, second_claim = d.claim(first), d.claim(second)
+    (first_hold,) = [hold for hold in ledger.holds(JOB_ID) if hold.task == first]
+    assert ledger.preempt(JOB_ID, "nobody", [first_hold]) == -1
+    assert [ledger.preempt(JOB_ID, d.leader, [first_hold]) for _ in range(2)] == [1, 0]
     assert [hold.is_preempted for hold in ledger.holds(JOB_ID)].count(True) == 1
     assert ledger.heartbeat(JOB_ID, [first], claim.token) == "preempted"
-    assert ledger.heartbeat(JOB_ID, [second], other.token) == "ok"
+    assert ledger.heartbeat(JOB_ID, [second], second_claim.token) == "ok"
     assert d.fail(first, claim, "preempted") == "handed back"
     assert "attempts" not in ledger.task_facts(JOB_ID, first)
     assert d.dispatch() == [first]

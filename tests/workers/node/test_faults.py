@@ -40,10 +40,13 @@ def test_errors_have_their_class(error: Exception, kind: str) -> None:
     assert class_of(error) == kind
 
 
-def test_faults_alike_have_one_fingerprint() -> None:
-    one, other = ValueError("view 12 at 0x7f00 in /a/b.png"), ValueError("view 7 at 0x10 in /c.png")
-    assert fingerprint(one) == fingerprint(other)
-    assert fingerprint(one) != fingerprint(KeyError("view 12"))
+def test_similar_faults_have_one_fingerprint() -> None:
+    first, second = (
+        ValueError("view 12 at 0x7f00 in /a/b.png"),
+        ValueError("view 7 at 0x10 in /c.png"),
+    )
+    assert fingerprint(first) == fingerprint(second)
+    assert fingerprint(first) != fingerprint(KeyError("view 12"))
     assert len(without_numbers("x" * 1000)) == 160
 
 

@@ -39,7 +39,7 @@ SMALL = {
 
 
 def labelled(store: FolderStore) -> tuple[JobSpec, str, tuple[str, ...]]:
-    """A job for GPUs of the built-in home, done up to light: (job, house, its first batch of views)."""
+    """A GPU job of the built-in home, finished up to light: (job, house, its first batch of views)."""
     entries = [entry for entry, _ref in entries_from_arguments(["builtin"])]
     (house,), spec = completed(
         entries, new_spec(recipe_from_name("preview", SMALL), n_views=1, gpu=True)
@@ -54,18 +54,18 @@ def labelled(store: FolderStore) -> tuple[JobSpec, str, tuple[str, ...]]:
 
 
 def queue_in_memory(config: FarmConfig) -> Celery:
-    """The farm's Celery application, its broker in this process."""
+    """The farm's Celery application with a broker in this process."""
     app = make_app(config)
     app.conf.update(broker_transport="memory", broker_transport_options={})
-    app.steps["worker"].clear()  # the heartbeat, which goes to Redis
+    app.steps["worker"].clear()  # removes the heartbeat, which needs Redis
     return app
 
 
 def lit_by_the_queue(folder: Path, monkeypatch: pytest.MonkeyPatch) -> str:
-    """The variant of Mitsuba that the light task of such a job was rendered with."""
+    """The Mitsuba variant that rendered the light task of such a job."""
     store = FolderStore(folder / "store")
     spec, house, views = labelled(store)
-    # The render process reads where the store is from its environment.
+    # The render process finds the store through its environment.
     monkeypatch.setenv("PBRS_STORE", store.url)
     monkeypatch.setenv("PBRS_FARM_SCRATCH", str(folder))
     config = FarmConfig(
@@ -75,9 +75,9 @@ def lit_by_the_queue(folder: Path, monkeypatch: pytest.MonkeyPatch) -> str:
     ledger = MemoryLedger(inputs={task: ",".join(views)})
     process = RenderProcess(partial(ChildProcess, HANDLER, folder / "log.txt"), ProcessLimits())
     slot = Slot(config, ledger, MemoryRegistry(), process)
-    monkeypatch.setattr(queued_task, "_slot", lambda: slot)
+    monkeypatch.setattr(queued_task, "current_slot", lambda: slot)
     app = queue_in_memory(config)
-    # Send as the coordinator does, to the queue of the stage; the worker listens to light.gpu alone.
+    # Send to the queue of the stage, like the coordinator; the worker listens to light.gpu only.
     app.send_task(queued_task.RUN, (spec.job_id, task, "r"), queue=queue_of(LIGHT, gpu=spec.gpu))
     give_up = time.monotonic() + 120
     with start_worker(app, queues=[LIGHT_GPU], perform_ping_check=False, shutdown_timeout=60):
@@ -91,7 +91,7 @@ def lit_by_the_queue(folder: Path, monkeypatch: pytest.MonkeyPatch) -> str:
 
 
 @pytest.mark.slow
-def test_a_worker_of_the_gpus_queue_renders_light_with_what_the_machine_has(
+def test_a_worker_of_the_gpu_queue_renders_light_on_the_machines_device(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     assert lit_by_the_queue(tmp_path, monkeypatch) == choose_variant()

@@ -14,7 +14,7 @@ from workers.ledger.task_ledger import Claim, LedgerUnavailable
 __all__ = ["bench"]  # a fixture
 
 
-def test_a_worker_logs_what_it_finished(bench: Bench, caplog: pytest.LogCaptureFixture) -> None:
+def test_a_worker_logs_finished_tasks(bench: Bench, caplog: pytest.LogCaptureFixture) -> None:
     bench.next.at(1, "ready")
     bench.next.at(5, "done", batches=[], n_views=0)
     with caplog.at_level("INFO", "pbrs.slot"):
@@ -35,7 +35,7 @@ def test_a_task_is_claimed_run_and_finished(bench: Bench) -> None:
 def test_the_lease_is_kept_while_the_process_talks_and_while_it_is_silent(bench: Bench) -> None:
     bench.next.at(0, "ready")
     for k in range(1, 200):
-        bench.next.at(k / 2, "step")  # twice a second, so that no poll is ever idle
+        bench.next.at(k / 2, "step")  # twice a second, so that no poll is idle
     bench.next.at(190, "done", batches=[], n_views=0)
     bench.run()
     assert bench.ledger.n_heartbeats == 9  # every 20 s
@@ -52,7 +52,7 @@ def test_a_lost_or_cancelled_task_is_killed(bench: Bench, answer: str) -> None:
     assert 40 <= bench.clock.now < 43
 
 
-def test_preemption_hands_the_task_back_at_once_and_without_a_log(bench: Bench) -> None:
+def test_preemption_hands_the_task_back_immediately_and_without_a_log(bench: Bench) -> None:
     bench.next.at(0, "ready")
     bench.next.at(7, lambda: bench.config.preemption_file.touch())
     bench.run()
@@ -124,7 +124,7 @@ def test_a_long_task_takes_another_of_its_house_with_it(bench: Bench) -> None:
     assert len(bench.started) == 1
 
 
-def test_redis_away_is_waited_for_but_not_for_ever(bench: Bench) -> None:
+def test_redis_away_is_waited_for_up_to_a_limit(bench: Bench) -> None:
     bench.ledger.n_away = 3
     bench.next.at(0, "ready")
     bench.next.at(1, "done", batches=[], n_views=0)
@@ -143,7 +143,7 @@ def test_a_refused_task_starts_no_process(bench: Bench) -> None:
     assert bench.registry.refusals == [
         f"job {JOB} has steps of another version; `pbrs-farm adopt {JOB}`"
     ]
-    assert bench.clock.now == 1.0  # it waits, so that others may take the task
+    assert bench.clock.now == 1.0  # it waits, so that other workers may take the task
 
 
 def test_the_lease_of_a_dead_sibling_is_ended(bench: Bench) -> None:
@@ -160,12 +160,12 @@ SECOND, THIRD = "h0/1/gl", "h0/2/gl"
 
 
 def of_one_house(bench: Bench, *seconds: float) -> None:
-    """The house has as many batches as there are seconds; each takes so long in the process."""
-    at = 0.0
+    """The house has one batch for each of `seconds`, which is its duration in the process."""
+    start = 0.0
     for k, took in enumerate(seconds):
         bench.ledger.inputs[f"h0/{k}/gl"] = ";".join("v" for _ in seconds)
-        at += took
-        bench.next.at(at, "done", batches=[], n_views=1)
+        start += took
+        bench.next.at(start, "done", batches=[], n_views=1)
     bench.next.at(0, "ready")
 
 
@@ -176,13 +176,13 @@ def test_short_tasks_are_claimed_and_reported_together(bench: Bench) -> None:
     assert len(bench.started) == 1
 
 
-def test_what_is_done_is_reported_every_five_seconds(bench: Bench) -> None:
+def test_finished_tasks_are_reported_every_five_seconds(bench: Bench) -> None:
     of_one_house(bench, 4.0, 4.0, 4.0)
     bench.run(TASK, SECOND, THIRD)
     assert bench.ledger.reports == [[TASK, SECOND], [THIRD]]
 
 
-def test_a_heartbeat_keeps_what_runs_what_waits_and_what_is_not_reported_yet(bench: Bench) -> None:
+def test_a_heartbeat_renews_running_waiting_and_unreported_tasks(bench: Bench) -> None:
     of_one_house(bench, 2.0, 40.0, 1.0)
     bench.run(TASK, SECOND, THIRD)
     assert bench.ledger.beaten[0] == [SECOND, THIRD, TASK]
@@ -200,7 +200,7 @@ def test_a_task_of_several_that_fails_leaves_the_others_be(bench: Bench) -> None
     assert bench.ledger.reports == [[TASK, THIRD]]
 
 
-def test_preemption_gives_back_what_has_not_begun_and_tells_what_is_done(bench: Bench) -> None:
+def test_preemption_returns_tasks_not_begun_and_reports_finished_ones(bench: Bench) -> None:
     of_one_house(bench, 1.0)
     bench.ledger.inputs |= {TASK: "v;v;v", SECOND: "v;v;v", THIRD: "v;v;v"}
     bench.next.at(3, lambda: bench.config.preemption_file.touch())

@@ -1,4 +1,4 @@
-"""A worker without OpenGL: its pictures are left out with one note where there are others, else the task fails."""
+"""A worker without OpenGL: its pictures are skipped with one note if others remain, else the task fails."""
 
 from __future__ import annotations
 
@@ -22,7 +22,7 @@ __all__ = ["bench"]
 
 
 class Steps:
-    """Stands where run_step does: notes the steps, and fails those of OpenGL."""
+    """Replaces run_step: records the steps, and fails those of OpenGL."""
 
     def __init__(self, fault: Exception) -> None:
         self.fault, self.seen = fault, list[tuple[str, str | None]]()
@@ -34,7 +34,7 @@ class Steps:
 
 
 def labelled(steps: Steps, monkeypatch: pytest.MonkeyPatch, modes: tuple[str, ...]) -> list[Result]:
-    """Two tasks of the stage gl, of two views each, by one runner."""
+    """Run two tasks of the stage gl, of two views each, by one runner."""
     monkeypatch.setattr(house_runner, "run_step", steps)
     entries = [entry for entry, _ref in entries_from_arguments(["builtin"])]
     (house,), spec = completed(entries, new_spec(recipe_from_name("preview"), modes=modes))
@@ -52,7 +52,7 @@ def labelled(steps: Steps, monkeypatch: pytest.MonkeyPatch, modes: tuple[str, ..
     ]  # fmt: skip
 
 
-def test_labels_go_on_and_opengl_is_tried_once(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_labels_continue_and_opengl_is_tried_once(monkeypatch: pytest.MonkeyPatch) -> None:
     steps = Steps(MachineFailed("no headless OpenGL 3.3"))
     results = labelled(steps, monkeypatch, ("opengl_dl", "opengl_il", "mlt_ol"))
     assert steps.seen == [
@@ -62,19 +62,17 @@ def test_labels_go_on_and_opengl_is_tried_once(monkeypatch: pytest.MonkeyPatch) 
     assert all("no headless OpenGL" in r.left_out for r in results)
 
 
-def test_a_job_of_opengl_alone_is_for_another_worker(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_job_of_only_opengl_is_for_another_worker(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(MachineFailed, match="no headless OpenGL"):
         labelled(Steps(MachineFailed("no headless OpenGL 3.3")), monkeypatch, ("opengl_dl",))
 
 
-def test_a_fault_of_the_home_stays_one(monkeypatch: pytest.MonkeyPatch) -> None:
+def test_a_fault_of_the_home_remains_a_fault(monkeypatch: pytest.MonkeyPatch) -> None:
     with pytest.raises(BadHouse):
         labelled(Steps(BadHouse("f", "p", "m")), monkeypatch, ("opengl_dl", "mlt_ol"))
 
 
-def test_a_slot_says_once_what_it_leaves_out(
-    bench: Bench, caplog: pytest.LogCaptureFixture
-) -> None:
+def test_a_slot_logs_its_skipped_modes_once(bench: Bench, caplog: pytest.LogCaptureFixture) -> None:
     bench.next.at(1, "ready")
     for seconds in (2, 4):
         bench.next.at(seconds, "done", batches=[], n_views=0, left_out="no headless OpenGL 3.3")

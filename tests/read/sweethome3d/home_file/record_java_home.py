@@ -1,4 +1,4 @@
-"""Records java_home.bin: the entry `Home` that Sweet Home 3D itself writes of JAVA_HOME_XML.
+"""Records java_home.bin: the entry `Home` as Sweet Home 3D writes it for JAVA_HOME_XML.
 
 Run by hand, with a JDK and the example homes' package: `python -m
 tests.read.sweethome3d.home_file.record_java_home`. Effects: runs javac and java, writes java_home.bin.

@@ -1,6 +1,6 @@
-"""Homes that hold the program's serialised objects alone, as versions before 5.3 wrote them.
+"""Homes with the program's serialised objects and no XML, as versions before 5.3 wrote them.
 
-java_home.bin is what Sweet Home 3D 7.0.2 wrote of JAVA_HOME_XML (record_java_home.py).
+Sweet Home 3D 7.0.2 wrote java_home.bin from JAVA_HOME_XML (record_java_home.py).
 """
 
 from __future__ import annotations
@@ -43,7 +43,7 @@ def plan_of(data: bytes) -> HomePlan:
     return parse_plan(open_container(data, "home.sh3d", None).root, "home.sh3d", 1000)
 
 
-def test_the_serialised_home_says_what_its_xml_says() -> None:
+def test_the_serialised_home_equals_its_xml() -> None:
     java, xml = plan_of(old_home(STREAM)), plan_of(JAVA_HOME_XML)
     assert java.properties["Author"] == "Éva 😀"
     for name in ("wall_height", "levels", "walls", "cameras"):
@@ -63,7 +63,7 @@ def test_a_home_without_xml_becomes_a_house() -> None:
     assert {"Chair", "Box", "Door", "Lamp"} <= {item.name for item in house.items}
 
 
-def test_a_stream_cut_anywhere_is_refused_with_what_to_do() -> None:
+def test_a_stream_cut_anywhere_is_refused_with_advice() -> None:
     for end in range(4, len(STREAM), 97):
         with pytest.raises(
             BadHouse, match=r"only the binary format of older versions.*save it again"
@@ -94,7 +94,7 @@ def test_whatever_the_bytes_the_outcome_is_a_plan_or_a_bad_house() -> None:
         (b"\x00", "unexpected code"),
     ],
 )
-def test_what_a_stream_claims_is_bounded_by_its_bytes(body: bytes, reason: str | None) -> None:
+def test_claimed_sizes_are_bounded_by_the_bytes(body: bytes, reason: str | None) -> None:
     if reason is None:
         assert java_objects(HEAD + body) == []
         return
