@@ -69,6 +69,7 @@ _MADE: Final = frozenset(
     {"WallInner", "WallOuter", "WallTop", "WallBottom", "SlabTop", "SlabSide", "SlabBottom", *HOLE_TYPES}
 )
 # fmt: on
+_LEAST_ROOM_M2: Final = 0.5  # smaller rooms are shafts
 _STOREY_M: Final = 2.7
 _LIGHT_BAND_LM: Final = 800.0
 
@@ -269,6 +270,12 @@ class _Structure:
                     f"{front_room.id}_ceiling", ItemKind.CEILING, over, front_room.id
                 )
             )
+            area = shapely.Polygon(polygon)
+            self._areas[front_room.id] = area
+            if area.area < _LEAST_ROOM_M2:
+                text = f"has {area.area:.2f} m2: a shaft, not a room"
+                self._notes.add("room-left-out", f"room {front_room.id}", text)
+                continue
             word = given_room("3dfront", front_room.kind)
             name = parted(front_room.kind) or "Room"
             if word and named_kind(f"{word} {name}") is not named_kind(word):
@@ -284,7 +291,6 @@ class _Structure:
                     types=(word or front_room.kind,) if front_room.kind else (),
                 )
             )
-            self._areas[front_room.id] = shapely.Polygon(polygon)
         if not rooms:
             raise BadHouse(file, "scene.room", "no room has a mesh of the type Floor")
         check_unit(rooms, file, "mesh", "3D-FRONT is in metres")
@@ -323,7 +329,7 @@ class _Structure:
         if not pieces:
             self._notes.add("missing-walls", "mesh", "no mesh of the type WallInner faces a room")
         items = [self._wall(p, pieces, k) for k, p in enumerate(pieces)]
-        return holes_with_names(self._house, holes_of(pieces)), items
+        return holes_with_names(self._house, holes_of(pieces), self._notes), items
 
     def _wall(self, piece: WallPiece, pieces: Sequence[WallPiece], k: int) -> Item:
         sheet = piece.sheet

@@ -11,6 +11,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.read.common.doors_and_windows import Hole, Style, merge_holes
 from pbrs_farm.read.common.given_classes import given_class
+from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.front3d.front_file import FrontFile, FrontPiece
 from pbrs_farm.read.front3d.front_walls import WallPiece
 
@@ -40,8 +41,13 @@ def is_opening(piece: FrontPiece) -> bool:
     return title_class is not None and title_class.kind in ("door", "window")
 
 
-def holes_with_names(house: FrontFile, holes: Sequence[tuple[Hole, WallPiece]]) -> list[Hole]:
-    """Every hole once, with its kind, style and hinge; hole meshes without a gap have one, too."""
+def holes_with_names(
+    house: FrontFile, holes: Sequence[tuple[Hole, WallPiece]], notes: Notes
+) -> list[Hole]:
+    """Every hole once, with its kind, style and hinge; hole meshes without a gap have one, too.
+
+    A door or window of the furniture that is in no hole is a note.
+    """
     named = _openings_by_name(house)[:_MAX_NAMED]
     results = []
     for hole, piece in holes:
@@ -52,7 +58,13 @@ def holes_with_names(house: FrontFile, holes: Sequence[tuple[Hole, WallPiece]]) 
     for opening in named:
         if opening.box is not None and not any(_stands_in(opening, hole) for hole in results):
             extra.append(_of_mesh(opening, named))
-    return merge_holes([*results, *extra])
+    merged = merge_holes([*results, *extra])
+    for opening in named:
+        if opening.box is None and not any(_stands_in(opening, hole) for hole in merged):
+            x, y, z = (round(float(v), 2) for v in opening.at)
+            text = f"{opening.title} is in no hole of a wall; it is left out"
+            notes.add("opening-without-wall", f"({x}, {y}, {z})", text)
+    return merged
 
 
 def _openings_by_name(house: FrontFile) -> list[_NamedOpening]:

@@ -331,3 +331,28 @@ def test_a_million_entries_are_refused_quickly(tmp_path: Path) -> None:
     with pytest.raises(BadHouse, match="at most"):
         read_house(resolve(str(path)), ReadFields())
     assert time.monotonic() - start < 20
+
+
+def test_a_door_in_no_hole_and_a_shaft_are_notes(tmp_path: Path) -> None:
+    scene = files.front_house()
+    plain = read(written(tmp_path, scene))
+    for room in scene["scene"]["room"]:
+        for child in room["children"]:
+            if child["ref"] == "hole1/model":
+                child["pos"] = [2.0, 0.0, 2.0]
+    floor = files.level_face(20.0, 20.0, 20.5, 20.6, 0.0, up=True)
+    xyz = np.asarray(floor, float).reshape(-1, 3)
+    row = {"uid": "shaft/floor", "type": "Floor", "xyz": xyz.ravel().tolist(),
+           "faces": list(range(len(xyz)))}  # fmt: skip
+    model = next(m for m in scene["mesh"] if m["type"] == "Floor")
+    scene["mesh"].append({**model, **row, "uv": [0.0] * (2 * len(xyz)),
+                          "normal": [0.0, 1.0, 0.0] * len(xyz)})  # fmt: skip
+    child = {"ref": "shaft/floor", "instanceid": "shaft/1", "pos": [0, 0, 0], "rot": [0, 0, 0, 1],
+             "scale": [1, 1, 1]}  # fmt: skip
+    shaft = {"type": "EquipmentRoom", "instanceid": "EquipmentRoom-9", "children": [child]}
+    scene["scene"]["room"].append(shaft)
+    house = read(written(tmp_path, scene))
+    assert [r.name for r in house.rooms] == [r.name for r in plain.rooms]
+    texts = {n.kind: n.text for n in house.notes}
+    assert texts["room-left-out"] == "has 0.30 m2: a shaft, not a room"
+    assert texts["opening-without-wall"].startswith("door/")
