@@ -1,4 +1,4 @@
-"""Sweet Home 3D homes: .sh3d archives and bare Home.xml. No effects before `read`."""
+"""Sweet Home 3D homes: .sh3d archives, .sh3x of its web version, bare Home.xml. No effects before `read`."""
 
 from __future__ import annotations
 
@@ -24,9 +24,9 @@ def _companions_of_sweethome3d(given: GivenFile, files: SourceFiles) -> str:
 
 # fmt: off
 FORMAT = Format(
-    kind="sweethome3d", title="Sweet Home 3D", files=".sh3d or Home.xml", order=10,
+    kind="sweethome3d", title="Sweet Home 3D", files=".sh3d, .sh3x or Home.xml", order=10,
     brings="walls, rooms, furniture, lamps", where="sweethome3d.com, or your own",
-    licence="of each home", suffixes=(".sh3d", ".xml", ".zip"), shared_suffixes=frozenset({".xml", ".zip"}),
+    licence="of each home", suffixes=(".sh3d", ".sh3x", ".xml", ".zip"), shared_suffixes=frozenset({".xml", ".zip"}),
     contains=re.compile(rb"\A\s*(<\?xml[^>]*>\s*)?<home\b|\APK.{28}(Home|ContentDigests)", re.DOTALL),
     read=_read_sweethome3d, companions=_companions_of_sweethome3d, uses_packages=True,
 )

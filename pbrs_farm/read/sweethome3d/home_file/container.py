@@ -5,6 +5,8 @@ from __future__ import annotations
 import posixpath
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from typing import Final
+from urllib.parse import unquote
 from xml.etree.ElementTree import Element, ParseError
 
 from defusedxml.common import DefusedXmlException
@@ -18,6 +20,10 @@ from pbrs_farm.read.sweethome3d.home_file.java_home import RESAVE, root_from_jav
 
 MAX_XML_BYTES = 16 * 2**20
 MAX_DEPTH = 200  # nested elements
+_PROGRAM_FOLDERS: Final = (
+    "com/eteks/sweethome3d/io/resources/",
+    "com/eteks/sweethome3d/io/resources/textures/",
+)
 
 
 @dataclass(frozen=True, slots=True)
@@ -30,6 +36,25 @@ class Container:
     root: Element
     contents: Resources
     parsed: Mapping[str, ObjModel] = field(default_factory=dict)
+
+
+class _WebResources:
+    """The program's own contents by the addresses that Sweet Home 3D JS gives them.
+
+    Its files name them "lib/resources/models/armchair.zip!/armchair.obj", or by the address of a server.
+    """
+
+    def __init__(self, resources: Resources | None) -> None:
+        self._resources = resources
+
+    def read(self, name: str) -> bytes | None:
+        """The program's content of that file name, or None for other names."""
+        is_web = "!/" in name or "://" in name or name.startswith("lib/resources/")
+        if self._resources is None or not is_web:
+            return None
+        file = posixpath.basename(unquote(name))
+        places = (f"{folder}{file}" for folder in _PROGRAM_FOLDERS)
+        return next((data for p in places if (data := self._resources.read(p)) is not None), None)
 
 
 def open_container(data: bytes, file: str, resources: Resources | None) -> Container:
@@ -46,9 +71,11 @@ def open_container(data: bytes, file: str, resources: Resources | None) -> Conta
             if java is None:
                 raise BadHouse(file, "", "has no Home.xml and no Home", hint=RESAVE)
             return Container(root_from_java(java, file), Layered(archive, resources))
-        return Container(_parse_xml(xml, file, "Home.xml"), Layered(archive, resources))
+        contents = Layered(archive, resources, _WebResources(resources))
+        return Container(_parse_xml(xml, file, "Home.xml"), contents)
     if data.lstrip(b"\xef\xbb\xbf \t\r\n")[:1] == b"<" or data[:2] in (b"\xff\xfe", b"\xfe\xff"):
-        return Container(_parse_xml(data, file, ""), Layered(resources))
+        contents = Layered(resources, _WebResources(resources))
+        return Container(_parse_xml(data, file, ""), contents)
     raise BadHouse(file, "", "neither a .sh3d archive (zip) nor a Home.xml", hint=RESAVE)
 
 
