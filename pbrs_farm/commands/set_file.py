@@ -19,7 +19,7 @@ from __future__ import annotations
 import argparse
 import re
 import tomllib
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import replace
 from pathlib import Path
@@ -31,14 +31,18 @@ from pbrs_farm.commands.options import request_from
 from pbrs_farm.core.errors import BadInput, PbrsError
 from pbrs_farm.core.house_split import shares_from_text
 from pbrs_farm.core.options import option, options_of, values_of_table
+from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.core.record import Record
 from pbrs_farm.core.shown_text import did_you_mean, hint_of_choice
 from pbrs_farm.curate.teaching_rules import REASONS
 from pbrs_farm.export.form import ViewForm, form_names, form_of, options_from
 from pbrs_farm.export.view_options import ViewOptions
-from pbrs_farm.prepare.source import words_of_homes
+from pbrs_farm.prepare.home_kinds import kind_of_word
+from pbrs_farm.prepare.source import resolve, words_of_homes
 from pbrs_farm.regular_files import read_given, text_from_bytes
 from pbrs_farm.run.request import CameraOptions, ModelsOption, Request, wanted_of
+from pbrs_farm.run.step_cache import camera_file_text
+from pbrs_farm.sample.camera_source import source_of
 from pbrs_farm.sets.data_set import SHIPPED, DataSet, SetCard, SetForm, SetPart, shipped_sets
 from pbrs_farm.truth.optional_layers import check_lens
 from pbrs_farm.views.packing.pack_options import PackOptions
@@ -103,7 +107,8 @@ def is_set(word: str) -> bool:
 def set_from_word(word: str) -> DataSet:
     """The data set of that name, or of a user's file.
 
-    Checks the whole file, but reads none of its homes. Raises BadInput with file and place.
+    Checks the whole file: every home and folder exists, every option is valid, and every form can hold
+    the views of its parts. Reads no home. Raises BadInput with file and place.
     """
     if word in shipped_sets():
         return set_from_bytes((SHIPPED / f"{word}{_ENDING}").read_bytes(), f"{word}{_ENDING}")
@@ -134,6 +139,7 @@ def set_from_bytes(data: bytes, file: str) -> DataSet:
     forms = tuple(
         _form(form, table, names, shares, file) for form, table in tables.get("form", {}).items()
     )
+    _check_forms(forms, parts, file)
     card = SetCard(
         of_card.get("title") or name, of_card.get("text", ""), of_card.get("licence", "")
     )
@@ -179,6 +185,8 @@ def _part(name: str, table: Mapping[str, Any], common: Mapping[str, Any], file: 
         request = request_from(argparse.Namespace(**values), PartOptions)
         recipe = recipe_of(request)
         want = wanted_of(request)
+        _check_homes(words, request.models)
+        _check_recipe(recipe)
         if want.layers:
             check_lens(want.layers, recipe.lens.lens)
         seeds = dress_seeds(request.dress)
@@ -186,6 +194,56 @@ def _part(name: str, table: Mapping[str, Any], common: Mapping[str, Any], file: 
     return SetPart(
         name, tuple(dict.fromkeys(words)), recipe, want, seeds, request.models, rules, values
     )
+
+
+def _check_homes(words: Sequence[str], models: str) -> None:
+    """Raise the error of the first home that cannot be found, and of a folder of models that does not exist."""
+    if models and not Path(models).is_dir():
+        raise BadInput("models", models, "no such folder")
+    for word in words:
+        kind = kind_of_word(word)
+        if kind is None:
+            resolve(word, models=models)
+
+
+def _check_recipe(recipe: Recipe) -> None:
+    """Raise the error of a style, a furniture library or a camera file that does not exist."""
+    from pbrs_farm.dress.style import STYLES
+    from pbrs_farm.prepare.dress_catalogue import GENERATED
+
+    style = recipe.dress.style
+    if style and style not in STYLES:
+        raise BadInput("dress.style", style, "no such style", hint=hint_of_choice(style, STYLES))
+    for path in filter(None, recipe.dress.catalogue.split(":")):
+        if path != GENERATED and not Path(path).exists():
+            raise BadInput("dress.catalogue", path, "no such file or folder")
+    if source_of(recipe.cameras).is_file:
+        camera_file_text(recipe.cameras)
+
+
+def _check_forms(forms: Sequence[SetForm], parts: Sequence[SetPart], file: str) -> None:
+    """Raise BadInput for a form that cannot hold the views of one of its parts."""
+    for form in forms:
+        kind = form_of(form.to) if form.packing is None else None
+        if not isinstance(kind, ViewForm):
+            continue
+        for part in parts:
+            text = _misfit(kind, part) if part.name in form.parts else ""
+            if text:
+                hint = 'parts = ["..."] names other parts'
+                raise BadInput(file, f"form.{form.name}: part {part.name}", text, hint=hint)
+
+
+def _misfit(form: ViewForm, part: SetPart) -> str:
+    """Reason why a form cannot hold the views of a part; "" if it can."""
+    lens, layers = part.recipe.lens.model, set(part.want.layers)
+    if form.lenses and lens not in form.lenses:
+        return f"lens.model {lens}: this format supports {', '.join(form.lenses)}"
+    if form.layers and layers.isdisjoint(form.layers):
+        return f"{form.name} needs a layer of {', '.join(form.layers)}"
+    if form.is_of_frames and source_of(part.recipe.cameras).is_sequence is False:
+        return f'{form.name} needs frames of sequences (cameras = "walk")'
+    return ""
 
 
 def _form(

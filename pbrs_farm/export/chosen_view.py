@@ -230,8 +230,9 @@ def require_lens(view: ChosenView, form: str, *models: str) -> None:
     form: its name, for the message. models: supported lens models beside "pinhole".
     """
     model = view.facts.get("lens", {}).get("model", "pinhole")
-    if model not in ("pinhole", *models):
-        text = f"lens.model {model}: this format supports {', '.join(('pinhole', *models))}"
+    supported = tuple(dict.fromkeys(("pinhole", *models)))
+    if model not in supported:
+        text = f"lens.model {model}: this format supports {', '.join(supported)}"
         raise BadInput(f"--to {form}", view.id, text, hint="another --to")
 
 

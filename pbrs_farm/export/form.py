@@ -71,7 +71,8 @@ class ViewForm:
     set's file take them from there; write reads them as `choice.of(WordOptions)`. has_classes: True if
     user-defined classes can replace NYU40's. finish: called once after all splits with the whole
     folder, the names of the splits (() without) and the Choice. convention: None if the form defines no
-    pixels, axes or depth.
+    pixels, axes or depth. lenses: lens models that it can describe, () for any. layers: a view needs one of
+    them, if any are named. is_of_frames: True if its views are the frames of sequences.
     """
 
     of: ClassVar[str] = "views"
@@ -83,6 +84,9 @@ class ViewForm:
     has_classes: bool = False
     finish: Callable[[Path, tuple[str, ...], Choice], None] | None = None
     convention: Convention | None = None
+    lenses: tuple[str, ...] = ()
+    layers: tuple[str, ...] = ()
+    is_of_frames: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -64,6 +64,7 @@ class ForkGuard:
 
 
 _guard = ForkGuard()
+_conditional: set[tuple[str, str]] = set()  # endpoint and bucket of proven conditional writes
 
 
 def forbid_in_this_process() -> None:
@@ -92,6 +93,10 @@ class S3Store:
         self._obstore: Any = obstore
         self.client: Any = Client(bucket, **_client_options(self._prefix, settings))
 
+    @property
+    def _place(self) -> tuple[str, str]:
+        return self._settings.endpoint, self._bucket
+
     def __reduce__(self) -> tuple[object, ...]:
         # A spawned process makes a new client.
         return S3Store, (self._bucket, self._prefix, self._settings)
@@ -109,10 +114,29 @@ class S3Store:
                 self._put(key, data, "create")
             except self._obstore.exceptions.AlreadyExistsError:
                 # An earlier try may have succeeded although its response was lost.
+                _conditional.add(self._place)
                 return n_tries > 0 and bytes(self._obstore.get(self.client, key).bytes()) == data
             return True
 
-        return self._call(key, create)
+        is_first = self._call(key, create)
+        if is_first and self._place not in _conditional:
+            self._call(key, lambda _tries: self._check_conditions(key, data))
+        return is_first
+
+    def _check_conditions(self, key: str, data: bytes) -> None:
+        """Raise StoreRefused if the gateway creates an object that exists, as two writers would both be first.
+
+        Called after the first create of a process. The object is created again, with equal bytes: twice,
+        since another process may delete it in between.
+        """
+        for _ in range(2):
+            try:
+                self._put(key, data, "create")
+            except self._obstore.exceptions.AlreadyExistsError:
+                _conditional.add(self._place)
+                return
+        text = f"{self._settings.endpoint or self.url} ignores If-None-Match: writers overwrite each other"
+        raise StoreRefused(key, text, hint="use a gateway with conditional writes, or a folder")
 
     def get(self, key: str) -> bytes:
         return self._call(key, lambda _tries: bytes(self._obstore.get(self.client, key).bytes()))

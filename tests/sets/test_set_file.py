@@ -168,3 +168,32 @@ def test_a_shipped_set_loads(name: str) -> None:
     assert data_set.card.title
     assert data_set.card.licence
     assert data_set.forms
+
+
+@pytest.mark.parametrize(
+    ("part", "form", "message"),
+    [
+        ('homes = ["made:1", "gone.sh3d"]', "", "part.views: .*gone.sh3d: no such file"),
+        ('homes = ["NoSuchHome"]', "", "no example home of that name"),
+        ('models = "gone"', "", "part.views: models: gone: no such folder"),
+        ('set = ["dress.style=bogus"]', "", "dress.style: bogus: no such style"),
+        ('set = ["dress.catalogue=gone"]', "", "dress.catalogue: gone: no such file"),
+        ('set = ["cameras.source=file", "cameras.file=gone.json"]', "", "gone.json: no such file"),
+        (
+            'size = "1024x512"\nset = ["lens.model=equirect"]',
+            "[form.colmap]",
+            "form.colmap: part views: lens.model",
+        ),
+        ("", "[form.layoutnet]", "lens.model pinhole: this format supports equirect"),
+        ("", "[form.kitti]", "kitti needs a layer of disparity, flow_forward"),
+        ("", "[form.tum]", "tum needs frames of sequences"),
+    ],
+)
+def test_homes_files_and_forms_are_checked_before_anything_is_made(
+    part: str, form: str, message: str, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    homes = "" if "homes" in part else 'homes = ["made:1"]\n'
+    text = f"[part.views]\nviews = 1\n{homes}{part}\n{form}\n"
+    with pytest.raises(BadInput, match=message):
+        set_from_bytes(text.encode(), "mine.toml")

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import multiprocessing
 import os
+import threading
+from dataclasses import replace
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
 from pathlib import Path
 
 import pytest
 
-from pbrs_farm.core.errors import BadInput, StoreFailed, StoreUnavailable
+from pbrs_farm.core.errors import BadInput, StoreFailed, StoreRefused, StoreUnavailable
 from pbrs_farm.store import MemoryStore, StoreSettings, store_from_url
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.store.object_store import content_type
@@ -80,3 +83,48 @@ def test_pictures_and_tables_have_content_types() -> None:
     assert content_type("a/b.png") == "image/png"
     assert content_type("recipe.json") == "application/json"
     assert content_type("weird") == "application/octet-stream"
+
+
+class _Gateway(BaseHTTPRequestHandler):
+    """An S3 gateway of one bucket; it honours If-None-Match or not. State: the objects, of its class."""
+
+    protocol_version = "HTTP/1.1"
+    honours = False
+    objects: dict[str, bytes]
+
+    def do_PUT(self) -> None:
+        data = self.rfile.read(int(self.headers["Content-Length"]))
+        is_refused = self.honours and self.headers["If-None-Match"] and self.path in self.objects
+        if not is_refused:
+            self.objects[self.path] = data
+        self.send_response(412 if is_refused else 200)
+        self.send_header("ETag", '"1"')
+        self.send_header("Content-Length", "0")
+        self.end_headers()
+
+    def log_message(self, *_args: object) -> None:
+        pass
+
+
+@pytest.mark.parametrize("honours", [True, False])
+def test_a_gateway_that_ignores_conditions_is_refused_by_name(honours: bool) -> None:
+    kind = type("Gateway", (_Gateway,), {"honours": honours, "objects": {}})
+    server = ThreadingHTTPServer(("127.0.0.1", 0), kind)
+    threading.Thread(target=server.serve_forever, daemon=True).start()
+    endpoint = f"http://127.0.0.1:{server.server_address[1]}"
+    settings = replace(DEAD, s3=replace(DEAD.s3, endpoint=endpoint, retry_timeout_s=5))
+    first, second = (store_from_url("s3://bucket/p", settings) for _ in range(2))
+    try:
+        if honours:
+            assert (first.put_if_absent("a", b"1"), second.put_if_absent("a", b"2")) == (
+                True,
+                False,
+            )
+            assert second.put_if_absent("b", b"3")
+            assert kind.objects == {"/bucket/p/a": b"1", "/bucket/p/b": b"3"}
+        else:
+            with pytest.raises(StoreRefused, match=f"{endpoint} ignores If-None-Match"):
+                first.put_if_absent("a", b"1")
+    finally:
+        server.shutdown()
+        server.server_close()

@@ -71,7 +71,7 @@ def write_bop(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     _write_models(out / "models", meshes, numbers)
     scenes: dict[str, list[ChosenView]] = {}
     for view in views:
-        require_lens(view, "bop")
+        require_lens(view, "bop", *FORM.lenses)
         scenes.setdefault(view.house.id, []).append(view)
     for scene, (house_id, house_views) in enumerate(scenes.items()):
         folder = out / _SPLIT / f"{scene:06d}"
@@ -276,6 +276,7 @@ FORM = ViewForm(
     " `models_info.json` in mm, `camera.json`, `train_pbr/<scene>/` with `rgb`, `depth`, `mask`,"
     " `mask_visib`, `scene_camera.json`, `scene_gt.json`, `scene_gt_info.json`,"
     " `scene_gt_coco.json`; a scene is a home; (0, 0) of K is the centre of the first pixel",
+    lenses=("pinhole",),
     convention=Convention(
         0, has_k=True, axes="camera x right, y down, z forward; mm", depth="mm, along the axis"
     ),

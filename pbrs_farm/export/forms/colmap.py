@@ -92,7 +92,7 @@ def _write_lines(file: Path, lines: Iterable[str]) -> None:
 
 
 def colmap_camera_line(view: ChosenView) -> str:
-    require_lens(view, "colmap", "radtan", "fisheye")
+    require_lens(view, "colmap", *FORM.lenses)
     i = intrinsics_of(view.facts)
     # FULL_OPENCV has k1 k2 p1 p2 k3 and three more, which are 0.
     model, more = {
@@ -138,6 +138,7 @@ FORM = ViewForm(
     "colmap",
     write_colmap,
     "a text model: cameras, images, points from depth; of a rig also rigs and frames",
+    lenses=("pinhole", "radtan", "fisheye"),
     convention=Convention(
         0.5, has_k=True, axes="camera x right, y down, z forward; the home's world, y up, m"
     ),

@@ -84,7 +84,7 @@ def _scenes(views: Iterable[ChosenView]) -> list[list[ChosenView]]:
     """The views by home and pin-hole: a scene has one projection."""
     scenes: dict[tuple[Any, ...], list[ChosenView]] = {}
     for view in views:
-        require_lens(view, "hypersim")
+        require_lens(view, "hypersim", *FORM.lenses)
         i = intrinsics_of(view.facts)
         key = (view.house.id, i.width_px, i.height_px, i.fx, i.fy, i.cx, i.cy)
         scenes.setdefault(key, []).append(view)
@@ -370,6 +370,7 @@ FORM = ViewForm(
     " `_detail` with cameras and boxes, `metadata_images_split_scene_v1.csv`, `metadata_camera_parameters.csv`;"
     " also our `index.csv` and `README.md`; with `--split` one root whose table has the splits",
     finish=join_splits,
+    lenses=("pinhole",),
     convention=Convention(
         0.5,
         has_k=True,

@@ -89,7 +89,7 @@ def _calibration(frame: SequenceFrame) -> str:
     Pixels count from the centre of the first one, as in KITTI's own tools (drawBox3D.m adds 1 for
     MATLAB, whose first pixel's centre is (1, 1)).
     """
-    require_lens(frame.first, "kitti")
+    require_lens(frame.first, "kitti", *FORM.lenses)
     k = np.array(k_of_whole_centres(frame.first.facts["K"]), np.float64)
     lines = [_projection("P2", k, 0.0)]
     if frame.right is not None:
@@ -110,6 +110,8 @@ FORM = ViewForm(
     write_kitti,
     "KITTI 2015: `image_2`, `image_3`, `disp_occ_0`, `disp_noc_0`, `flow_occ`, `flow_noc`, `calib`"
     " ((0, 0) of P2 and P3 is the centre of the first pixel)",
+    lenses=("pinhole",),
+    layers=("disparity", "flow_forward"),
     convention=Convention(
         0,
         has_k=True,

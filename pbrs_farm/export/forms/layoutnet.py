@@ -133,5 +133,6 @@ FORM = ViewForm(
     "corners of rooms in panoramas, for LayoutNet and HorizonNet: `img/<house>__<view>.png` (1024 x 512,"
     " turned upright and along the walls), `label_cor/<house>__<view>.txt` (`x y` of ceiling and floor of"
     " each corner in turn)",
+    lenses=("equirect",),
     convention=Convention(0.0, has_k=False, axes=""),
 )

@@ -53,7 +53,7 @@ def write_marigold(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     if not shown:
         raise BadInput("--to marigold", "", "no view has a picture", hint="run with --modes")
     for view in shown:
-        require_lens(view, "marigold", "radtan")
+        require_lens(view, "marigold", *FORM.lenses)
         (out / view.house.id).mkdir(exist_ok=True)
         rgb = f"{view.house.id}/rgb_{view.id}.png"
         (out / rgb).write_bytes(view.data(view.picture or ""))
@@ -123,6 +123,7 @@ FORM = ViewForm(
     " (`rgb albedo shading residual`, float32 npy, linear), with `albedo`, `roughness`, `metallic` `filename_list_iid_appearance.txt`"
     " (`rgb albedo material mask`, sRGB PNG, EXR of roughness and metallic, PNG without glass and mirrors); with `--split` `train/filename_list_train.txt` and so on",
     finish=name_lists_by_split,
+    lenses=("pinhole", "radtan"),
     convention=Convention(
         None, has_k=False, axes="camera x right, y up, z backward", depth="mm, along the axis"
     ),

@@ -56,7 +56,7 @@ def write_nerfstudio(views: list[ChosenView], out: Path, _choice: Choice) -> Non
 
 def _frame(view: ChosenView, folder: Path) -> dict[str, Any]:
     # Write the picture and, where it is exported, the depth.
-    require_lens(view, "nerfstudio", *_MODELS)
+    require_lens(view, "nerfstudio", *FORM.lenses)
     picture = required_picture(view, "nerfstudio")
     facts = view.facts
     pose = Z_UP_FROM_Y_UP @ np.array(facts["world_from_camera_opengl"], np.float64)
@@ -90,6 +90,7 @@ FORM = ViewForm(
     "nerfstudio",
     write_nerfstudio,
     "`transforms.json` (z up, OpenGL axes), pictures, depth in mm",
+    lenses=tuple(_MODELS),
     convention=Convention(
         0.5,
         has_k=True,

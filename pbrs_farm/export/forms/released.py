@@ -66,7 +66,7 @@ def camera_line(view: ChosenView) -> str:
     Raises BadInput for a lens other than a pinhole, as the format has no place for it. A view without a
     score has 0. World axes and metres as in view.json.
     """
-    require_lens(view, "released")
+    require_lens(view, "released", *FORM.lenses)
     pose = np.array(view.facts["world_from_camera_opengl"], np.float64)
     width, height = view.facts["width_px"], view.facts["height_px"]
     k = np.array(view.facts["K"], np.float64)
@@ -82,6 +82,7 @@ FORM = ViewForm(
     "the published PBRS layout: `mlt_v2/<house>/<6 digits>_mlt.png`, `depth_v2`, `normal_v2`,"
     " `category_v2`, `boundary_v2`, `opengl_ver2`, `camera_v2/<house>/room_camera.txt`,"
     " `data_goodlist_v2.txt`",
+    lenses=("pinhole",),
     convention=Convention(
         None,
         has_k=False,

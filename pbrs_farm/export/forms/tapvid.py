@@ -79,6 +79,7 @@ FORM = ViewForm(
     write_tapvid,
     "`tapvid.pkl` as TAP-Vid's DAVIS: house id -> `video`, `points` (N, T, 2) as shares of width and height,"
     " `occluded` (N, T); for films rendered with `--tracks`",
+    is_of_frames=True,
     convention=Convention(
         0.5, has_k=False, axes="x right, y down from the upper left corner, 0..1"
     ),

@@ -50,7 +50,7 @@ def _write_trajectory(folder: Path, side: str, timed: Sequence[tuple[ChosenView,
     for name in ("rgb", "depth"):
         (folder / f"{name}{side}").mkdir(parents=True)
     for view, time in timed:
-        require_lens(view, "tum", "radtan")
+        require_lens(view, "tum", *FORM.lenses)
         files = {"rgb": view.data(required_picture(view, "tum")), "depth": _depth(view)}
         for name, data in files.items():
             file = f"{name}{side}/{time:.6f}.png"
@@ -79,6 +79,8 @@ FORM = ViewForm(
     "`rgb.txt`, `depth.txt`, `groundtruth.txt`; depth 5000 a metre; the right views of pairs in"
     " `rgb_right.txt`, `depth_right.txt`, `groundtruth_right.txt`, other cameras of a rig likewise; `left_out.txt` names views"
     " outside sequences",
+    lenses=("pinhole", "radtan"),
+    is_of_frames=True,
     convention=Convention(
         None,
         has_k=False,

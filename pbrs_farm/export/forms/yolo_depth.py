@@ -26,7 +26,7 @@ def write_yolo_depth(views: list[ChosenView], out: Path, _choice: Choice) -> Non
 
 
 def _depth(view: ChosenView) -> tuple[str, bytes]:
-    require_lens(view, "yolo-depth", "radtan")
+    require_lens(view, "yolo-depth", *FORM.lenses)
     if view.has("depth_z") and not view.has("depth"):
         data = BytesIO()
         np.save(data, view.array("depth_z").astype(np.float32))
@@ -46,6 +46,7 @@ FORM = ViewForm(
     " more; with `--layers depth_z` float32 metres in `.npy`), `data.yaml` as `yolo`'s, for"
     " `yolo depth train data=data.yaml`",
     finish=write_depth_yaml,
+    lenses=("pinhole", "radtan"),
     convention=Convention(
         None, has_k=False, axes="", depth="mm (`depth_scale: 1000`), along the axis"
     ),
