@@ -36,7 +36,7 @@ class BlurFields(FieldGroup):
         0.0, "readout time from the top to the bottom row; 0 = global shutter", 0, 60
     )
     right_mps: float = field(0.0, "camera velocity without a walk, camera axes", -1e3, 1e3)
-    up_mps: float = field(0.0, low=-1e3, high=1e3)
+    up_mps: float = field(0.0, "metres per second", -1e3, 1e3)
     forward_mps: float = field(0.0, low=-1e3, high=1e3)
     pan_dps: float = field(0.0, "to the right, degrees per second", -1e4, 1e4)
     tilt_dps: float = field(0.0, "upwards", -1e4, 1e4)
@@ -192,7 +192,7 @@ class SensorFields(FieldGroup):
         "none", "a type of camera; other fields override it"
     )
     is_on: bool = field(False, "simulate the sensor; off = noise-free pictures")
-    f_number: float = field(2.0, low=0.5, high=64)
+    f_number: float = field(2.0, "of the lens", 0.5, 64)
     shutter_s: float = field(0.0, "0 = automatic, up to shutter_max_s", 0, 60)
     shutter_min_s: float = field(1e-4, "minimum automatic shutter time", high=60, above=0)
     shutter_max_s: float = field(1 / 30, "maximum automatic shutter time", high=60, above=0)

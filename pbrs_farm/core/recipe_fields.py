@@ -133,8 +133,8 @@ class RepairFields(FieldGroup):
     default_wall_rgb: tuple[Share, Share, Share] = field(
         (1.0, 1.0, 1.0), "sRGB of walls without a colour, paper section 3"
     )
-    remove_persons: bool = True
-    remove_plants: bool = True
+    remove_persons: bool = field(True, "remove figures of people")
+    remove_plants: bool = field(True, "remove the source's plants")
     fallback_light: bool = field(True, "add a ceiling light to rooms without any light")
     lamp_in_every_room: bool = field(
         False, "add a ceiling light to each living space without a lamp"
@@ -157,7 +157,7 @@ class RepairFields(FieldGroup):
 
 
 class SurroundingFields(FieldGroup):
-    """Surroundings before the windows (docs/dress.md), which light the rooms."""
+    """Surroundings outside the windows (docs/dress.md), which light the rooms."""
 
     steps = ("house",)
 
@@ -177,14 +177,14 @@ class CameraFields(FieldGroup):
     n_sectors: int = field(6, "number of equal sectors of a room", 1, 360)
     cell_m: float = field(0.25, "cell size of the viewpoint grid", 0.05, 100)
     height_min_m: float = field(1.5, "minimum height of the eye above the floor", high=100, above=0)
-    height_max_m: float = field(1.6, high=100, above=0)
+    height_max_m: float = field(1.6, "maximum height of the eye", high=100, above=0)
     tilt_deg: float = field(11.0, "camera pitch, downwards", above=-90, below=90)
     tilt_sd_deg: float = field(
         0.0, "standard deviation of the pitch; 0 = fixed, as in the paper", 0, 30
     )
     roll_sd_deg: float = field(0.0, "standard deviation of the roll; 0 = level", 0, 30)
     clearance_m: float = field(0.10, "minimum distance of the eye from any obstacle", 0, 10)
-    min_objects: int = field(3, low=0, high=65_535)
+    min_objects: int = field(3, "minimum number of objects in the picture", 0, 65_535)
     min_object_fraction: float = field(
         0.01, "minimum share of the picture for an object to count", 0, 1
     )
@@ -208,11 +208,11 @@ class CameraFields(FieldGroup):
     )
     hfov_rad: float = field(2 * 0.5534, "full horizontal field of view", above=0, below=3.1)
     hfov_spread: float = field(0.0, "photo: relative variation of the focal length", 0, 0.3)
-    score_width_px: int = field(640, high=4096, above=0)
+    score_width_px: int = field(640, "item buffer of the final score", high=4096, above=0)
     score_height_px: int = field(480, high=4096, above=0)
-    coarse_width_px: int = field(160, high=4096, above=0)
+    coarse_width_px: int = field(160, "item buffer of the first score", high=4096, above=0)
     coarse_height_px: int = field(120, high=4096, above=0)
-    per_sector: int = field(1, low=1, high=1000)
+    per_sector: int = field(1, "views of a sector", 1, 1000)
     source: str = Field(
         "sampled",
         max_length=4096,
@@ -268,7 +268,7 @@ class ImageFields(FieldGroup):
 
     steps = ("tracks", "truth", "opengl_dl", "opengl_il", "light")
 
-    width_px: int = field(DEFAULT_SIZE[0], high=MAX_EDGE_PX, above=0)
+    width_px: int = field(DEFAULT_SIZE[0], "width of the pictures", high=MAX_EDGE_PX, above=0)
     height_px: int = field(DEFAULT_SIZE[1], high=MAX_EDGE_PX, above=0)
 
     @model_validator(mode="after")
@@ -285,10 +285,10 @@ class LightFields(FieldGroup):
 
     steps = ("light", "develop")
 
-    integrator: Literal["path", "metropolis"] = "path"
+    integrator: Literal["path", "metropolis"] = field("path", "path tracing or Metropolis")
     spp: int = field(64, "samples per pixel of `path`", 1, MAX_SAMPLES)
     direct_spp: int = field(512, "direct samples, with metropolis", 0, MAX_SAMPLES)
-    mutations_per_pixel: int = field(1024, low=1, high=MAX_SAMPLES)
+    mutations_per_pixel: int = field(1024, "of `metropolis`", 1, MAX_SAMPLES)
     max_depth: int = field(12, "maximum path segments", 1, 1024)
     rr_depth: int = field(1, "first vertex; 1 is the fastest of 1 to 6, docs/lab/light.md", 1, 1024)
     filter: Literal["box", "tent"] = field("tent", "reconstruction filter of a pixel's samples")
@@ -312,7 +312,7 @@ class LightFields(FieldGroup):
     tail_pixels: int = field(
         1024, "pixels that share the tail of a Metropolis path; 0 = its own pixel only", 0, 4096
     )
-    denoise: bool = True
+    denoise: bool = field(True, "denoise the light by Open Image Denoise")
 
     @model_validator(mode="after")
     def _noise_can_be_reached(self) -> Self:
@@ -332,7 +332,7 @@ class SkyFields(FieldGroup):
 
     steps = ("illuminance", "light")
 
-    kind: Literal["sunsky", "panorama"] = "sunsky"
+    kind: Literal["sunsky", "panorama"] = field("sunsky", "sky model, or an HDR picture")
     panoramas: str = field(
         "", "latitude-longitude HDR picture or a folder of them; empty = those of `pbrs-farm skies`"
     )
@@ -356,7 +356,7 @@ class EmissionFields(FieldGroup):
 
     steps = ("illuminance", "light")
 
-    preset: Literal["photometric", "released"] = "photometric"
+    preset: Literal["photometric", "released"] = field("photometric", "lx and lm, or constants")
     sky_lx: float = field(
         10_000.0,
         "illuminance of open ground by a clear sky alone, sun at 30 degrees",
@@ -367,7 +367,7 @@ class EmissionFields(FieldGroup):
     lamp_lm: float = field(1_600.0, "flux of a Sweet Home 3D lamp of power 0.5", high=1e7, above=0)
     lm_per_watt: float = field(13.0, "luminous efficacy for SUNCG's watts", high=1e4, above=0)
     compensate_shades: bool = field(True, "flux is measured outside the shade")
-    lamp_kelvin_min: float = field(2700.0, low=500, high=40_000)
+    lamp_kelvin_min: float = field(2700.0, "colour temperature of bulbs", 500, 40_000)
     lamp_kelvin_max: float = field(3000.0, low=500, high=40_000)
     released_bulb: float = field(400.0, "radiance, W m-2 sr-1", 0, 1e7)
     released_shade: float = field(0.5, "radiance, W m-2 sr-1", 0, 1e7)
@@ -379,7 +379,7 @@ class MaterialFields(FieldGroup):
 
     steps = ("illuminance", "light")
 
-    preset: Literal["physical", "released"] = "physical"
+    preset: Literal["physical", "released"] = field("physical", "docs/spec/suncg.md")
 
 
 class ToneFields(FieldGroup):
@@ -387,7 +387,7 @@ class ToneFields(FieldGroup):
 
     steps = ("develop",)
 
-    preset: Literal["photo", "released"] = "photo"
+    preset: Literal["photo", "released"] = field("photo", "as photographs, or as the paper")
     key: float = field(0.18, "released: Reinhard's key value", high=1000, above=0)
     white_balance: float = field(0.7, "correction of the light's colour; 0 = none, 1 = white", 0, 1)
     camera: Literal["neutral", "phone", "slr", "webcam", "kinect", "drawn"] = field(
@@ -434,7 +434,7 @@ class HistogramFields(FieldGroup):
 
     colour_space: Literal["rgb", "ycbcr"] = field("rgb", "sRGB-encoded; joint bins")
     colour_bins: Literal[2, 4, 8, 16] = field(8, "per channel, three channels jointly")
-    depth_bins: Literal[8, 16, 32, 64, 128, 256] = 128
+    depth_bins: Literal[8, 16, 32, 64, 128, 256] = field(128, "depth_min_m to depth_max_m")
     depth_min_m: float = field(0.0, "nearer depths count in the first bin", 0, 1e6)
     depth_max_m: float = field(10.0, "farther depths count in the last bin", high=1e6, above=0)
     near_m: float = field(0.25, "nearer surfaces count as touching the camera", high=1e6, above=0)
