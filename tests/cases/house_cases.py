@@ -38,7 +38,10 @@ def cases() -> Iterator[Case]:
     yield Case("ifc_attic", partial(_ifc, _attic), _ask_for_a_sloped_ceiling)
     yield Case("ifc_lowceiling", partial(_ifc, _low_ceiling), _ask_for_the_height_of_the_ceiling)
     yield Case("ifc_twostoreys", partial(_ifc, _two_storeys), _ask_for_two_rooms)
-    yield Case("ifc_skylight", partial(_ifc, _skylight), _ask_for_light_from_the_roof)
+    for record in (True, False):
+        name = "ifc_skylight" if record else "ifc_bare_skylight"
+        write = partial(_ifc, partial(_skylight, has_record=record))
+        yield Case(name, write, _ask_for_light_from_the_roof)
     yield Case("ifc_no_floor", partial(_ifc, _no_floor), _ask_for_two_closed_rooms)
     yield Case("ifc_no_records", partial(_ifc, _no_records), _ask_for_two_closed_rooms)
     for slab in (True, False):
@@ -241,8 +244,8 @@ def _attic(house: IfcHouse) -> Any:
     return roofs[0]
 
 
-def _skylight(house: IfcHouse) -> None:
-    """The attic with a window of 1 x 1 m in the southern slope."""
+def _skylight(house: IfcHouse, *, has_record: bool) -> None:
+    """The attic with a window of 1 x 1 m in the southern slope; has_record: that it fills its hole."""
     roof = _attic(house)
     up, out = np.array([0.707, 0.707]), np.array([-0.707, 0.707])  # along and out of the slope
     middle = np.array([1.25, 2.25]) + 0.09 * out
@@ -258,7 +261,8 @@ def _skylight(house: IfcHouse) -> None:
     pane = across(0.04)
     house.model.createIfcStyledItem(pane, [house.styles["glass"]], None)
     window = house.product("IfcWindow", "Roof window", [pane])
-    house.row("IfcRelFillsElement", RelatingOpeningElement=hole, RelatedBuildingElement=window)
+    if has_record:
+        house.row("IfcRelFillsElement", RelatingOpeningElement=hole, RelatedBuildingElement=window)
 
 
 def _ask_for_light_from_the_roof(path: Path) -> None:

@@ -100,31 +100,28 @@ def voids_of_walls(
         mesh = meshes.get(opening.id())
         fillings = [r.RelatedBuildingElement for r in opening.HasFillings or ()]
         walls = _parts(relation.RelatingBuildingElement, items, ItemKind.WALL)
-        has_window = any(f.is_a("IfcWindow") for f in fillings)
-        roof = _parts(relation.RelatingBuildingElement, items, ItemKind.CEILING)
-        in_roof = not walls and has_window
-        if mesh is None or not (roof if in_roof else walls):
+        around = walls or _parts(relation.RelatingBuildingElement, items, ItemKind.CEILING)
+        if mesh is None or not around:
             continue
         if not fillings and getattr(opening, "PredefinedType", None) == "RECESS":
             continue
         points = mesh.world @ world[:3, :3].T + world[:3, 3]
-        drawn = [items[f.GlobalId] for f in fillings if f.GlobalId in items]
-        drawn = (
-            drawn
-            if fillings
-            else [
-                i
-                for i in loose
-                if _holds(points, i) and any(_holds(items[w].bounds, i) for w in walls)
-            ]
-        )
-        of_kind = [i for i in drawn if i.kind in (ItemKind.DOOR, ItemKind.WINDOW)]
+        if fillings:
+            inside = [items[f.GlobalId] for f in fillings if f.GlobalId in items]
+        else:
+            bounds = [items[i].bounds for i in around]
+            inside = [i for i in loose if _holds(points, i) and any(_holds(b, i) for b in bounds)]
+        of_kind = [i for i in inside if i.kind in (ItemKind.DOOR, ItemKind.WINDOW)]
         item, others = (of_kind[0], of_kind[1:]) if of_kind else (None, [])
+        in_roof = not walls
+        has_window = item is not None or any(f.is_a("IfcWindow") for f in fillings)
+        if in_roof and not has_window:
+            continue  # of a chimney or a staircase
         undrawn = [] if item else [f for f in fillings if f.is_a("IfcDoor") or f.is_a("IfcWindow")]
         yield Void(
             id=str(opening.GlobalId),
             level_id=item.level_id if item is not None else level_of(float(points[:, 1].min())),
-            walls=roof if in_roof else walls,
+            walls=around,
             points=points,
             item=item,
             is_window=item.kind is ItemKind.WINDOW
@@ -132,7 +129,7 @@ def voids_of_walls(
             else any(f.is_a("IfcWindow") for f in undrawn),
             undrawn=str(undrawn[0].GlobalId) if undrawn else "",
             in_roof=in_roof,
-            others=tuple(i.id for i in others if i is not None),
+            others=tuple(i.id for i in others),
         )
 
 

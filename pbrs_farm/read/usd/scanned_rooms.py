@@ -69,8 +69,9 @@ class _Part(NamedTuple):
 def scan_of_stage(given: GivenFile) -> dict[str, Any]:
     """The walls, doors, windows, openings, floors, objects and sections. Raises BadHouse without a wall."""
     notes = Notes(given.path.name, strict=False)
-    with diagnostics_in(notes) as diagnostics:
-        stage = opened_stage(StageFolder.of(given.path, given.models), notes, diagnostics)
+    folder = StageFolder.of(given.path, given.models)
+    with diagnostics_in(folder, notes) as diagnostics:
+        stage = opened_stage(folder, notes, diagnostics)
         try:
             parts = list(_parts(stage, given.path.name))
             sections = list(_sections(stage))

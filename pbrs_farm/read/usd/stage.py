@@ -54,7 +54,7 @@ def read_usd(given: GivenFile, fields: ReadFields) -> House:
 
     notes = Notes(path.name, strict=fields.strict)
     folder = StageFolder.of(path, models)
-    with diagnostics_in(notes) as diagnostics:
+    with diagnostics_in(folder, notes) as diagnostics:
         stage = opened_stage(folder, notes, diagnostics)
         time = _time()
         shaders = Shaders(notes, lambda asset: _material_text(folder, asset), time)
@@ -93,7 +93,7 @@ def companions_of_usd(given: GivenFile, files: SourceFiles) -> str:
     beside = [_name_beside_stage(folder, path, name) for name in (*side_files(path), "rooms.json")]
     try:
         try_out(folder)
-        with diagnostics_in(notes):  # reading notes its warnings
+        with diagnostics_in(folder, notes):  # reading notes its warnings
             names = [name for name, _ in files_of_stage(folder)]
     except BadHouse:
         names = []

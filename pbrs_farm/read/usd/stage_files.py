@@ -146,21 +146,23 @@ WARNED: Final = "library-warning"
 
 
 @contextmanager
-def diagnostics_in(notes: Notes) -> Iterator[Any]:
-    """Collect the library's warnings, which it would print, as notes."""
+def diagnostics_in(folder: StageFolder, notes: Notes) -> Iterator[Any]:
+    """Collect the library's warnings, which it would print, as notes without the folder's path."""
     diagnostics = UsdUtils.CoalescingDiagnosticDelegate()
     try:
         yield diagnostics
     finally:
-        _note_warnings(diagnostics.TakeUncoalescedDiagnostics(), notes)
+        _note_warnings(diagnostics.TakeUncoalescedDiagnostics(), folder, notes)
 
 
-def _note_warnings(rows: Iterable[Any], notes: Notes) -> None:
+def _note_warnings(rows: Iterable[Any], folder: StageFolder, notes: Notes) -> None:
     """A note for each place in the library that warned, with its first warning."""
+    own_path = f"{real_path(folder.root.root)}/"
     texts: dict[tuple[str, int], dict[str, None]] = {}
     for row in rows:
         place = str(row.sourceFileName), int(row.sourceLineNumber)
-        texts.setdefault(place, {})[" ".join(str(row.commentary).split())] = None
+        text = " ".join(str(row.commentary).split()).replace(own_path, "")
+        texts.setdefault(place, {})[text] = None
     for first, *others in texts.values():
         times = f"{len(others) + 1} times: " if others else ""
         notes.add(WARNED, "", f"USD warns {times}{first}")
@@ -169,7 +171,8 @@ def _note_warnings(rows: Iterable[Any], notes: Notes) -> None:
 def opened_stage(folder: StageFolder, notes: Notes, diagnostics: Any) -> Any:
     """The composed stage; unresolved references become notes.
 
-    diagnostics: of diagnostics_in. Raises BadHouse for a damaged file, too many prims, or if a third of the references is missing.
+    diagnostics: of diagnostics_in. Raises BadHouse for a damaged file, too many prims, or if a third
+    of the references is missing.
     """
     path = folder.path
     if path.stat().st_size > MAX_SCENE_BYTES:
@@ -185,7 +188,7 @@ def opened_stage(folder: StageFolder, notes: Notes, diagnostics: Any) -> Any:
         real = layer.realPath.partition("[")[0]
         if real and folder.name_of(real) is None:
             raise BadHouse(path, "", f"{real!r} leads out of the folder", hint=_HINT)
-    missing = _note_missing(diagnostics, notes)
+    missing = _note_missing(diagnostics, folder, notes)
     if missing > _MISSING_SHARE * max(n_references, missing):
         text = f"{missing} of {max(n_references, missing)} references do not resolve"
         hint = "they refer to files of another machine: get them; " + _HINT
@@ -257,7 +260,7 @@ def damaged(path: Path, error: Exception) -> BadHouse:
     return BadHouse(path, "", f"damaged: {text.strip(': ')}")
 
 
-def _note_missing(diagnostics: Any, notes: Notes) -> int:
+def _note_missing(diagnostics: Any, folder: StageFolder, notes: Notes) -> int:
     """Number of references that the library could not open; a note each, and the other warnings'."""
     n, rest = 0, []
     for row in diagnostics.TakeUncoalescedDiagnostics():
@@ -272,7 +275,7 @@ def _note_missing(diagnostics: Any, notes: Notes) -> int:
             )
         else:
             rest.append(row)
-    _note_warnings(rest, notes)
+    _note_warnings(rest, folder, notes)
     return n
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from pxr import Kind, Usd, UsdGeom
+from pxr import Kind, Tf, Usd, UsdGeom
 
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import BOX_ONLY, House, ItemKind
@@ -17,6 +17,8 @@ from pbrs_farm.prepare.plan_house import plan_of_file
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve
 from pbrs_farm.read.common.format import PLAN, GivenFile
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.usd.stage_files import StageFolder, diagnostics_in
 from tests.inputs.scanned_stages import dining_group, thing, write_scanned_stage
 from tests.inputs.usd_files import UsdHome, walls_of
 
@@ -77,6 +79,14 @@ def test_warnings_of_the_library_are_one_note_and_do_not_reach_the_terminal(
     assert "8 times" in note.text
     assert "MaterialBindingAPI" in note.text
     assert "Warning" not in capfd.readouterr().err
+
+
+def test_warnings_do_not_tell_where_the_file_is(tmp_path: Path) -> None:
+    folder = StageFolder.of(write_scanned_stage(tmp_path), "")
+    notes = Notes("room.usda", strict=True)
+    with diagnostics_in(folder, notes):
+        Tf.Warn(f"Asset @{folder.path}@ has a deprecated version")
+    assert [n.text for n in notes.all()] == ["USD warns Asset @room.usda@ has a deprecated version"]
 
 
 def test_items_of_a_group_with_their_name_are_apart(tmp_path: Path) -> None:
