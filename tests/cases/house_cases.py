@@ -44,6 +44,7 @@ def cases() -> Iterator[Case]:
         yield Case(name, write, _ask_for_light_from_the_roof)
     yield Case("ifc_no_floor", partial(_ifc, _no_floor), _ask_for_two_closed_rooms)
     yield Case("ifc_no_records", partial(_ifc, _no_records), _ask_for_two_closed_rooms)
+    yield Case("ifc_tall_walls", partial(_ifc, _tall_walls), _ask_for_a_window_upstairs)
     for slab in (True, False):
         name = f"ifc_garage_{'solid' if slab else 'planar'}"
         write = partial(_ifc, partial(_garage, has_slab=slab))
@@ -320,6 +321,26 @@ def _no_records(house: IfcHouse) -> None:
         house.product("IfcWall", f"Inner {k}", [solid])
     house.product("IfcDoor", "Door", [house.box_solid((3.02, 2, 0), (3.08, 2.9, 2.1))])
     house.product("IfcWindow", "Window", [house.box_solid((1, -0.2, 0.9), (2, -0.1, 2.1))])
+
+
+def _tall_walls(house: IfcHouse) -> None:
+    """Walls of two storeys with a window in each, neither with an opening element."""
+    house.storey("ground", 0.0)
+    _slab(house, "floor", -0.25, 0.25, "FLOOR")
+    _four_walls(house, 0.0, 5.3)
+    house.product("IfcWindow", "Lower", [house.box_solid((1, -0.2, 0.9), (2, -0.1, 2.1))])
+    house.storey("first", 2.75)
+    floor = house.box_solid((0, 0, 2.5), (_W, _D, 2.75))
+    house.product("IfcSlab", "floor", [floor], PredefinedType="FLOOR")
+    house.product("IfcWindow", "Upper", [house.box_solid((1, -0.2, 3.65), (2, -0.1, 4.85))])
+    _slab(house, "deck", 5.3, 0.25, "ROOF")
+
+
+def _ask_for_a_window_upstairs(path: Path) -> None:
+    house, report = repaired(path)
+    assert [len([o for o in house.openings if o.is_window]), len(house.rooms)] == [2, 2]
+    assert all("windows" in r.lit_by for r in house.rooms)
+    _ask_for_no_leak(report)
 
 
 def _garage(house: IfcHouse, *, has_slab: bool) -> None:

@@ -65,6 +65,11 @@ class _WallFrame:
     area_m2: float
     is_side: bool  # no end of the wall
 
+    def spans(self, low_y: float, high_y: float) -> bool:
+        """True if the wall reaches from one height to another, as one of several storeys does."""
+        y = self.points[:, 1]
+        return bool(y.min() <= low_y + _RIM_M and high_y - _RIM_M <= y.max())
+
 
 def openings(items: Sequence[Item]) -> tuple[Opening, ...]:
     """An opening for every door and window that has a box and is in a wall.
@@ -285,7 +290,7 @@ def _opening_of_leaf(item: Item, leaf: Box, frames: Sequence[_WallFrame]) -> Ope
     standing = [
         p
         for f in frames
-        if f.level_id == item.level_id
+        if f.level_id == item.level_id or f.spans(float(low[1]), float(high[1]))
         for p in _wall_points_around(f, axes, low, high)
     ]
     if not standing:
