@@ -17,7 +17,6 @@ from typing import TYPE_CHECKING, Any, Final, cast
 
 from pbrs_farm.commands.command_line import Parser
 from pbrs_farm.commands.options import add_options, group_of
-from pbrs_farm.core.checked_calls import MAX_EDGE_PX
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.number_ranges import seeds_of
 from pbrs_farm.core.shown_text import escaped, printable, shown
@@ -172,6 +171,8 @@ def size_of(text: str | None) -> tuple[int, int] | None:
 
     Raises BadInput for anything else, including a size of 0 or above 16,384.
     """
+    from pbrs_farm.core.checked_calls import MAX_EDGE_PX
+
     if text is None:
         return None
     width, _, height = text.partition("x")
