@@ -24,7 +24,7 @@ from pbrs_farm.check.embree_caster import Rays
 from pbrs_farm.check.followed_points import SEEN, OtherView, follow_points
 from pbrs_farm.check.stored_mesh import triangles_from_glb
 from pbrs_farm.check.stored_view import StoredView
-from pbrs_farm.core.arrays import F32, F64, Bools
+from pbrs_farm.core.arrays import F32, Bools
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.formats.layer_file import layer_from_bytes
@@ -69,12 +69,11 @@ def noise_figures(root: Path) -> dict[str, float]:
         exposure, gains = _metering(root, first)
         pairs = {
             "noise": [_exposed(root, frame, exposure, gains) for frame in (first, second)],
-            "picture": [np.float32(f.picture("mlt_il_ol")) for f in (first, second)],
-            "opengl": [np.float32(f.picture("opengl_il")) for f in (first, second)],
+            "picture": [f.picture("mlt_il_ol").astype(np.float32) for f in (first, second)],
+            "opengl": [f.picture("opengl_il").astype(np.float32) for f in (first, second)],
         }
         for name, (here, there) in pairs.items():
-            error = _squared_error(first, np.asarray(here / 255.0), np.asarray(there / 255.0))
-            squared[name].append(error)
+            squared[name].append(_squared_error(first, here, there))
         print(first.id, {n: round(_psnr(e[-1:]), 1) for n, e in squared.items()}, flush=True)
     seconds = [sum(_marker(root, step, frame)["seconds"] for step in ("light", "develop")) for frame in frames]  # fmt: skip
     return {f"film.{name}_db": round(_psnr(errors), 2) for name, errors in squared.items()} | {
@@ -107,15 +106,15 @@ def _exposed(root: Path, frame: Frame, exposure: float, gains: Any) -> F32:
     return np.asarray(tone(picture, recipe_from_name("fast").tone, exposure=exposure), np.float32)
 
 
-def _squared_error(first: Frame, here: F64, there: F64) -> float:
-    """Mean squared difference along the flow."""
+def _squared_error(first: Frame, here: F32, there: F32) -> float:
+    """Mean squared difference of two pictures (0 to 255) along the flow, of a range of 1."""
     flow = first.layer("flow_forward").astype(np.float64)
     rows, columns = np.indices(flow.shape[:2])
     positions = np.stack([rows + flow[..., 1], columns + flow[..., 0]])
     warped = np.stack(
         [ndimage.map_coordinates(there[..., c], positions, order=3, mode="nearest") for c in range(3)], -1
     )  # fmt: skip
-    return float(((warped - here[..., :3]) ** 2).mean(-1)[_valid(first)].mean())
+    return float((((warped - here[..., :3]) / 255) ** 2).mean(-1)[_valid(first)].mean())
 
 
 def _valid(frame: Frame) -> Bools:
