@@ -22,26 +22,16 @@ from pbrs_farm.core.classes import (
     SHELVES,
     TABLE,
 )
-from pbrs_farm.core.frames import LYING_ALONG_Z
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import Rgb
 from pbrs_farm.dress.thing_materials import plain
-from pbrs_farm.furnishings.things.joints import drawer_box, hollow, is_drawer, opens, shelves
+from pbrs_farm.furnishings.things.joints import Inside, Look, fronts_of, hollow
 from pbrs_farm.furnishings.things.maker import Maker, Size, Thing, thing
-from pbrs_farm.furnishings.things.shapes import Pair
 from pbrs_farm.geometry.outlines import spaced
 
 # fmt: off
 _BOARD_M: Final = 0.018
-
-
-class Space(NamedTuple):
-    """The space behind a column of fronts."""
-
-    x: Pair  # between its sides
-    back: float  # z of its back's inner face
-    rail: Material | None = None  # for clothes, where it is tall
-    is_filled: bool = False  # it has its shelves already
+_FRONT_M: Final = 0.02  # of a piece's depth, for its fronts
 
 
 class Boards(NamedTuple):
@@ -73,7 +63,8 @@ def bookcase(m: Maker, boards: Boards, size: Size) -> None:
         for low, high in pairwise(levels) if w > 0.95 else ():
             m.box(0.018, (low + 0.018, high), (-hd + 0.006, hd - 0.004))
     if has_doors:
-        doors(m, boards, (-hw, hw), (levels[0], levels[2] + 0.018), hd, 2 if w > 0.55 else 1, -hd)
+        fronts_of(m, look_of(m, boards), (-hw, hw), (levels[0], levels[2] + 0.018), hd,
+            [("door",)] * (2 if w > 0.55 else 1), False, Inside(-hd, has_boards=False))
 
 
 @thing(group="shelves", nyu40=SHELVES, place=Place.FLOOR)
@@ -159,8 +150,9 @@ def tall_cabinet(m: Maker, boards: Boards, size: Size) -> None:
         m.box(w - 0.036, 0.06, 0.015, against=hd - 0.03)
         for y in (0.06, low, (low + high) / 2, high, h - 0.018):
             m.box(w - 0.036, 0.018, (-hd + 0.006, hd - 0.002), on=y)
+    look = look_of(m, boards)
     for span in ((0.06, low + 0.018), (high, h)):
-        doors(m, boards, (-hw, hw), span, hd, 1, -hd)
+        fronts_of(m, look, (-hw, hw), span, hd, [("door",)], span[0] > 1.2, Inside(-hd, has_boards=False))
 
 
 @thing(group="cabinet", nyu40=CABINET, place=Place.FLOOR)
@@ -191,9 +183,8 @@ def desk(m: Maker, boards: Boards, size: Size) -> None:
         x0, x1 = sorted((side * (w / 2 - 0.06), side * (w / 2 - 0.44)))
         low, high = 0.06 if m.chance(0.5) else h - 0.24, h - 0.026
         hollow(m, (x0, x1), (low, high), (-d / 2 + 0.03, d / 2 - 0.04), _BOARD_M, boards.body)
-        column_of_fronts(m, boards, (x0, x1), (low, high), d / 2 - 0.04,
-            ("drawer",) * max(1, round((high - low) / 0.19)), m.chance(0.4), True,
-            Space((x0 + _BOARD_M, x1 - _BOARD_M), -d / 2 + 0.038))
+        fronts_of(m, look_of(m, boards), (x0, x1), (low, high), d / 2 - 0.04,
+            [("drawer",) * max(1, round((high - low) / 0.19))], False, Inside(-d / 2 + 0.038))
 
 
 @thing(group="chair", nyu40=CHAIR, place=Place.FLOOR)
@@ -246,15 +237,15 @@ def cupboard(m: Maker, boards: Boards, size: Size, may_have_legs: bool,
     """A closed box behind columns of fronts, which are named from the top downwards."""
     w, h, d = size
     foot = carcass(m, boards, size, may_have_legs)
-    step, back = w / len(columns), -d / 2 + 0.008
-    has_knobs = bool(np.random.default_rng(m.integers(0, 1 << 30)).random() < 0.4)
-    for k, kinds in enumerate(columns):
-        a, b, t = -w / 2 + k * step, -w / 2 + (k + 1) * step, _BOARD_M
-        space = (a + (t / 2 if k else t), b - (t / 2 if k < len(columns) - 1 else t))
-        if k:
-            m.box(t, (foot + t, h - 0.026), (back, d / 2 - 0.018), x=a, of=boards.body)
-        column_of_fronts(m, boards, (a, b), (foot, h - 0.026), d / 2 - 0.018, kinds, has_knobs,
-            k % 2 == 0, Space(space, back, rail=m.metal if k % 2 == 0 else None))
+    fronts_of(m, look_of(m, boards), (-w / 2, w / 2), (foot, h - 0.026), d / 2 - _FRONT_M, columns,
+        False, Inside(-d / 2 + 0.008, rail=m.metal))
+
+
+def look_of(m: Maker, boards: Boards) -> Look:
+    """The fronts and pulls of a piece."""
+    kind = m.pick("flat", "flat", "flat", "shaker", "shaker", "grooved", "raised")
+    pull = m.pick("bar", "bow", "square", "knob", "knob", "disc", "ring", "edge")
+    return Look(kind, boards.front, boards.body, boards.top, pull, m.metal)
 
 
 def carcass(m: Maker, boards: Boards, size: Size, may_have_legs: bool) -> float:
@@ -267,7 +258,7 @@ def carcass(m: Maker, boards: Boards, size: Size, may_have_legs: bool) -> float:
     thick = m.pick(0.018, 0.025)
     has_legs = may_have_legs and m.chance(0.55)
     foot = m.uniform(0.09, 0.16) if has_legs else m.uniform(0.04, 0.07)
-    hollow(m, (-hw, hw), (foot, h - thick), (-hd, hd - 0.018), _BOARD_M, boards.body)
+    hollow(m, (-hw, hw), (foot, h - thick), (-hd, hd - _FRONT_M), _BOARD_M, boards.body)
     m.box(w + 0.008, (h - thick, h), (-hd, hd + 0.006), of=boards.top)
     if not has_legs:
         m.box(w - 0.02, foot, (-hd, hd - 0.05), of=boards.body)
@@ -275,80 +266,6 @@ def carcass(m: Maker, boards: Boards, size: Size, may_have_legs: bool) -> float:
         for x, z in product((-hw + 0.06, hw - 0.06), (-hd + 0.05, hd - 0.08)):
             m.frustum((0.013, 0.0), (0.022, foot), n=12, at=(x, 0.0, z), of=boards.top)
     return float(np.float32(foot))
-
-
-def column_of_fronts(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, kinds: Sequence[str],
-    has_knobs: bool, opens_left: bool, space: Space) -> None:
-    """Fronts from the top downwards before z; a door is 3.2 times as high as a drawer."""
-    total, below = 0.0, 0.0
-    for kind in kinds:
-        total += 3.2 if kind == "door" and len(kinds) > 1 else 1.0
-    for kind in kinds:
-        above = below
-        below += 3.2 if kind == "door" and len(kinds) > 1 else 1.0
-        front(m, boards, x, (y[1] - (y[1] - y[0]) * (below / total),
-            y[1] - (y[1] - y[0]) * (above / total)), z, kind, has_knobs, opens_left, space)
-
-
-def doors(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, n: int, back: float) -> None:
-    """Doors side by side before z, with shelves behind them; back: z of the back."""
-    has_knobs, space = m.chance(0.4), Space(x, back, is_filled=True)
-    for k in range(n):
-        front(m, boards, (x[0] + (x[1] - x[0]) * k / n, x[0] + (x[1] - x[0]) * (k + 1) / n), y, z,
-            "door", has_knobs, k % 2 == 0, space)
-
-
-def front(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, kind: str, has_knobs: bool,
-    opens_left: bool, space: Space) -> None:
-    """A door, drawer or flap that opens, with its interior."""
-    with opens(m, kind, x, y, z + 0.0165, space.back, opens_left):
-        face(m, boards, x, y, z, kind, has_knobs, opens_left)
-        if is_drawer(kind, y):
-            drawer_box(m, space.x, y, (space.back, z + 0.0005), boards.body)
-    if not space.is_filled and not is_drawer(kind, y):
-        shelves(m, space.x, y, (space.back, z), boards.body, space.rail)
-
-
-def face(m: Maker, boards: Boards, x: Pair, y: Pair, z: float, kind: str, has_knobs: bool,
-    opens_left: bool) -> None:
-    """A front 16 mm thick, 2 mm from its neighbours, and what opens it.
-
-    The grip is upright at a door's free side, and level on a drawer.
-    """
-    m.box((x[0] + 0.002, x[1] - 0.002), (y[0] + 0.002, y[1] - 0.002), 0.016, against=z + 0.0005,
-        of=boards.front)
-    z, wide, tall, middle = z + 0.0165, x[1] - x[0], y[1] - y[0], (x[0] + x[1]) / 2
-    if kind == "door":
-        a, long = x[1] - 0.035 if opens_left else x[0] + 0.035, min(0.16, 0.3 * tall)
-        high = y[0] + 0.55 * tall if tall > 0.9 else y[1] - 0.05 - long
-        if has_knobs:
-            knob(m, a, high, z)
-        else:
-            bar(m, (a - 0.005, high - long), (a + 0.005, high + long), z)
-    else:
-        high = y[1] - 0.035 if kind == "flap" else (y[0] + y[1]) / 2
-        out, half = 0.25 * wide if wide > 0.5 else 0.0, min(0.08, 0.3 * wide)
-        if has_knobs:
-            for a in (-out, out) if out else (0.0,):
-                knob(m, middle + a, high, z)
-        else:
-            bar(m, (middle - half, high - 0.005), (middle + half, high + 0.005), z)
-
-
-def knob(m: Maker, x: float, y: float, z: float) -> None:
-    """A round knob on a front at z."""
-    m.revolve([(0.0, 0.0), (0.006, 0.0), (0.006, 0.012), (0.014, 0.016), (0.012, 0.026),
-        (0.0, 0.028)], n=12, turn=LYING_ALONG_Z, at=(x, y, z), of=m.metal)
-
-
-def bar(m: Maker, low: Pair, high: Pair, z: float) -> None:
-    """A bar on two short feet."""
-    m.box((low[0], high[0]), (low[1], high[1]), 0.01, against=z + 0.018, of=m.metal)
-    wide, tall = high[0] - low[0], high[1] - low[1]
-    for end in (0.1, 0.9):
-        x, y = (low[0] + wide * (end if wide > tall else 0.5),
-            low[1] + tall * (0.5 if wide > tall else end))
-        m.box(0.008, 0.008, 0.018, x=x, on=y - 0.004, against=z, of=m.metal)
 
 
 CASE_GOODS: Final[Mapping[str, Thing[[Boards, Size]]]] = {one.name: one for one in (bookcase,

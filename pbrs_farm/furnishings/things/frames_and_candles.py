@@ -73,11 +73,7 @@ def frame_of(m: Maker, w: float, h: float, b: float, t: float, material: Materia
     mat: float) -> None:
     """A frame of moulding b wide and t thick round a photograph; mat: how wide its mat is."""
     hw = w / 2
-    with m.of(material):
-        m.box(w, b, (0, t), 0.0015)
-        m.box(w, (h - b, h), (0, t), 0.0015)
-        m.box(b, (b, h - b), (0, t), 0.0015, left=-hw)
-        m.box((hw - b, hw), (b, h - b), (0, t), 0.0015)
+    m.frame((-hw, hw), (0.0, h), b, (0, t), 0.0015, of=material)
     if mat > 0:
         m.box(w - 2 * b, (b, h - b), (0.002, 0.0045), of=plain("mat", (0.92, 0.91, 0.88), 0.9))
     edge = b + min(mat, 0.2 * (min(w, h) - 2 * b))

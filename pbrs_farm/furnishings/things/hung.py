@@ -19,10 +19,9 @@ from pbrs_farm.core.frames import LYING_ALONG_X, LYING_ALONG_Z, rotation_z
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.dress.style import Rgb, mix, shade
 from pbrs_farm.dress.thing_materials import MIRROR_GLASS, plain
-from pbrs_farm.furnishings.things.joints import hollow, opens, shelves
+from pbrs_farm.furnishings.things.joints import Inside, Look, fronts_of, hollow
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.papers import printed, white_paper
-from pbrs_farm.furnishings.things.shapes import Pair
 from pbrs_farm.geometry.bodies import smooth
 from pbrs_farm.geometry.outlines import Profile, rect, spaced
 from pbrs_farm.geometry.solids import lathe, quads_surface
@@ -75,65 +74,19 @@ def wall_cupboard(m: Maker, body: Material, face: Material, width: float, height
     w, t = width / 2, 0.018
     # The last form leaves an open end with shelves.
     e = 0.22 if form == 5 and width > 0.75 else 0.0
-    wide, step = width - e, (width - e) / n
-    hollow(m, (-w, -w + wide), (0.0, height), (0.0, d), t, body)
+    hollow(m, (-w, w - e), (0.0, height), (0.0, d), t, body)
     if e > 0:
         with m.of(body):
             m.box((w - e, w), height, (0.0, t))
             m.box((w - t, w), height, (t, d))
             for y in spaced(0.0, height - t, max(2, round(height / 0.3) + 1)):
                 m.box((w - e, w - t), t, (t, d), on=y)
-    if form == 4:
-        # Flaps that open upwards, one above the other.
-        rows = 2 if height > 0.5 else 1
-        for r in range(rows):
-            low, high = r * height / rows, (r + 1) * height / rows
-            with opens(m, "flap", (-w, w), (low, high), d + 0.0185, 0.0, is_high=True):
-                m.box(2 * w - 0.004, (low + 0.002, high - 0.002), 0.018, against=d + 0.0005,
-                    of=face)
-                m.box(0.16, 0.01, 0.0115, on=low + 0.02, against=d + 0.0185, of=m.metal)
-        shelves(m, (-w + t, w - t), (0.0, height), (0.008, d), body)
-        return
-    for k in range(n):
-        x = -w + k * step
-        opens_left = k % 2 == 0 and n > 1
-        with opens(m, "door", (x, x + step), (0.0, height), d + 0.0185, 0.0, opens_left):
-            cupboard_door(m, face, (x, x + step), height, d, form, opens_left)
-        if k:
-            m.box(t, (t, height - t), (0.008, d), x=x, of=body)
-        shelves(m, (x + (t / 2 if k else t), x + step - (t / 2 if k < n - 1 else t)), (0.0, height),
-            (0.008, d), body)
-
-
-def cupboard_door(m: Maker, face: Material, span: Pair, height: float, d: float, form: int,
-    opens_left: bool) -> None:
-    """A door of a cupboard that hangs, before d, with what opens it at the end without hinges."""
-    x, step = span[0], span[1] - span[0]
-    a = x + (step - 0.04 if opens_left else 0.04)
-    m.box((x + 0.002, x + step - 0.002), (0.002 + (0.016 if form == 2 else 0.0), height - 0.002),
-        0.018, against=d + 0.0005, of=face)
-    match form:
-        case 3 | 5:
-            with m.of(face):
-                # a raised frame round a panel
-                for y in (0.002, height - 0.062):
-                    m.box((x + 0.062, x + step - 0.062), 0.06, 0.005, on=y, against=d + 0.0185)
-                for q in (x + 0.002, x + step - 0.062):
-                    m.box(0.06, (0.002, height - 0.002), 0.005, left=q, against=d + 0.0185)
-        case 0:  # bars
-            with m.of(m.metal):
-                m.box(0.01, (0.04, 0.2), 0.008, x=a, against=d + 0.0345)
-                for y in (0.05, 0.185):
-                    m.box(0.008, 0.008, 0.016, x=a, on=y, against=d + 0.0185)
-    match form:
-        case 1 | 3:  # knobs
-            with m.of(m.metal):
-                m.revolve([(0.0, 0.0), (0.005, 0.0), (0.005, 0.018), (0.013, 0.02), (0.013, 0.028),
-                    (0.0, 0.03)], n=14, turn=LYING_ALONG_Z, at=(a, 0.07,
-                    d + (0.0235 if form == 3 else 0.0185)))
-        case 2:  # a grip edge
-            m.box((x + 0.002, x + step - 0.002), (0.002, 0.012), 0.0075, against=d + 0.0005,
-                of=m.metal)
+    kind, grip = (("flat", "bar"), ("flat", "knob"), ("flat", "edge"), ("shaker", "knob"),
+        ("flat", "bar"), ("shaker", "none"))[form]
+    # Flaps open upwards, one above the other.
+    columns = [("flap",) * (2 if height > 0.5 else 1)] if form == 4 else [("door",)] * n
+    fronts_of(m, Look(kind, face, body, body, grip, m.metal), (-w, w - e), (0.0, height), d,
+        columns, True, Inside(0.008))
 
 
 @thing(group="shelves", nyu40=SHELVES, place=Place.WALL)
