@@ -1,7 +1,7 @@
-"""This machine as a student has it: no root, no LLVM, OpenGL, libatomic or apt of the system, one folder to write in.
+"""Simulates a student's machine: no root, no system LLVM, OpenGL, libatomic or apt, one writable folder.
 
-Effects: a command runs in a mount namespace of its own (unshare, of util-linux), where those files are hidden and
-everything outside the folder is read-only. Needs root, or user namespaces, to make it; the command has neither.
+Effects: a command runs in a new mount namespace (unshare, of util-linux), where those files are hidden and
+everything outside the folder is read-only. Making it needs root or user namespaces; the command has neither.
 """
 
 from __future__ import annotations
@@ -23,7 +23,7 @@ HIDDEN: Final = (
 )  # fmt: skip
 """Files that a bare machine lacks."""
 
-# $1: the folder that is written; the files to hide, then --, then the command.
+# $1: the writable folder; then the files to hide, --, and the command.
 _ENTER: Final = """
 set -e
 mount --make-rprivate /
@@ -54,14 +54,14 @@ _KEPT: Final = ("PIP_", "SSL_", "REQUESTS_", "LANG", "HTTPS_PROXY", "HTTP_PROXY"
 
 @dataclass(frozen=True, slots=True)
 class BareMachine:
-    """A folder in which commands of a bare machine work; home, caches and environments are below it."""
+    """A working folder for commands of a bare machine, with home, caches and environments below it."""
 
     folder: Path
 
     def run(
         self, words: Sequence[str | Path], variables: Mapping[str, str] | None = None
     ) -> subprocess.CompletedProcess[str]:
-        """A command in the folder, its output kept as text, and printed where it does not end with 0."""
+        """Run a command in the folder; its output is captured as text, and printed if it fails."""
         home = self.folder / "home"
         home.mkdir(exist_ok=True)
         environment = {k: v for k, v in os.environ.items() if k.upper().startswith(_KEPT)}
@@ -89,15 +89,15 @@ class BareMachine:
         return done
 
     def environment(self, name: str) -> Path:
-        """The Python of a new, empty virtual environment, of the version that runs this."""
+        """The Python of a new, empty virtual environment, of the running version."""
         base = Path(sys.base_prefix) / "bin" / f"python{sys.version_info[0]}.{sys.version_info[1]}"
         self.run([base, "-m", "venv", name]).check_returncode()
         return self.folder / name / "bin" / "python"
 
     def notebook(self, python: Path, book: Path, variables: Mapping[str, str]) -> list[str]:
-        """What a notebook's cells show, in a fresh kernel of that Python: types of data, "error: ..." for a fault.
+        """Outputs of a notebook's cells in a fresh kernel of that Python: types of data, or "error: ...".
 
-        python: one that has nbclient and ipykernel.
+        python: one with nbclient and ipykernel.
         """
         shutil.copy2(book, self.folder)
         script = self.folder / "run_notebook.py"
@@ -106,7 +106,7 @@ class BareMachine:
         return done.stdout.split("\n")[:-1] or [f"error: {done.stderr[-500:]}"]
 
     def seed_cache(self) -> dict[str, str]:
-        """What to put into a command's environment so that it finds the packages this machine has fetched."""
+        """Environment variables with which a command finds this machine's fetched packages."""
         from pbrs_farm.assets.debian import cache_folder
 
         cache = self.folder / "cache"
@@ -118,7 +118,7 @@ class BareMachine:
 
 
 def can_be_made() -> bool:
-    """Whether this machine has the means: Linux with unshare and setpriv, and the right to use them."""
+    """True on Linux with unshare, setpriv and the right to use them."""
     if not all(map(shutil.which, ("unshare", "setpriv", "bash"))):
         return False
     enter = ["unshare", "--mount", *([] if os.geteuid() == 0 else ["--map-root-user"])]
@@ -126,7 +126,7 @@ def can_be_made() -> bool:
 
 
 def built_wheel(folder: Path) -> Path:
-    """The wheel of this checkout, built from its tracked and untracked files as they are."""
+    """The wheel of this checkout, built from its tracked and untracked files."""
     source = folder / "source"
     listed = ["git", "-C", str(REPO), "ls-files", "-co", "--exclude-standard", "-z"]
     names = subprocess.run(listed, check=True, capture_output=True, text=True).stdout.split("\0")

@@ -1,4 +1,4 @@
-"""The public names of Python, and the examples that their docstrings hold. Effects: runs examples where asked."""
+"""The public Python names, and the examples in their docstrings. Effects: runs examples on request."""
 
 from __future__ import annotations
 
@@ -26,45 +26,45 @@ _OF_NO_HOME: Final = (
 
 
 def public_names() -> dict[str, Any]:
-    """Name -> what it names: all of `pbrs_farm`, and each public method or property of its classes."""
-    found = {name: getattr(pf, name) for name in pf.__all__ if name != "__version__"}
+    """Name -> object: all of `pbrs_farm`, and each public method or property of its classes."""
+    objects = {name: getattr(pf, name) for name in pf.__all__ if name != "__version__"}
     for place in _RETURNED:
         module, _, name = place.partition(":")
-        found[name] = getattr(import_module(module), name)
-    for owner, value in list(found.items()):
+        objects[name] = getattr(import_module(module), name)
+    for owner, value in list(objects.items()):
         for name, member in vars(value).items() if inspect.isclass(value) else ():
             is_one = isinstance(member, _MEMBERS) or inspect.isfunction(member)
-            # What pydantic put there is its own.
+            # Pydantic's methods do not count.
             if is_one and not name.startswith(("_", "model_")):
-                found[f"{owner}.{name}"] = member
-    return found
+                objects[f"{owner}.{name}"] = member
+    return objects
 
 
 def example_of(name: str, named: Any) -> doctest.DocTest | None:
-    """The example in the docstring of a name; None where it has none."""
+    """The example in the docstring of a name; None without one."""
     named = getattr(named, "__func__", named)
     text = (getattr(named, "__doc__", None) or "") if named is not None else ""
-    found = doctest.DocTestParser().get_doctest(inspect.cleandoc(text), {}, name, None, 0)
-    return found if found.examples else None
+    example = doctest.DocTestParser().get_doctest(inspect.cleandoc(text), {}, name, None, 0)
+    return example if example.examples else None
 
 
 def needs_home(name: str) -> bool:
-    """Whether an example looks at a home, which takes seconds to make."""
+    """True if an example uses a home, which takes seconds to make."""
     return name.partition(".")[0] not in _OF_NO_HOME
 
 
 def fault_of(example: doctest.DocTest, names: dict[str, Any]) -> str:
-    """What an example prints that it does not say; "" where it says what it prints."""
+    """Difference between an example's output and the shown one; "" if they are equal."""
     example.globs = dict(names)
-    told: list[str] = []
+    outputs: list[str] = []
     flags = doctest.ELLIPSIS | doctest.NORMALIZE_WHITESPACE
     runner = doctest.DocTestRunner(verbose=False, optionflags=flags)
-    runner.run(example, out=told.append, clear_globs=False)
-    return "".join(told)
+    runner.run(example, out=outputs.append, clear_globs=False)
+    return "".join(outputs)
 
 
 def names_of_no_home() -> dict[str, Any]:
-    """What the examples of cameras and recipes may name."""
+    """Names available to the examples of cameras and recipes."""
     import numpy as np
 
     from pbrs_farm.core.camera import Camera, intrinsics_from_k
@@ -77,7 +77,7 @@ def names_of_no_home() -> dict[str, Any]:
 
 
 def names_of_home(folder: Path) -> dict[str, Any]:
-    """What all other examples may name: one home, one tiny frame; its files, written into the folder."""
+    """Names available to all other examples: one home, one tiny frame; its files are written into the folder."""
     import numpy as np
     import trimesh
     from PIL import Image
@@ -99,7 +99,7 @@ def names_of_home(folder: Path) -> dict[str, Any]:
 
 
 def faults(folder: Path, *, of_homes: bool) -> Iterator[tuple[str, str]]:
-    """(name, fault) of each example of one kind that was run in the folder, the current one."""
+    """(name, fault) of each example of one kind, run in the folder, which is the current one."""
     names = names_of_home(folder) if of_homes else names_of_no_home()
     for name, named in public_names().items():
         example = example_of(name, named)

@@ -1,8 +1,8 @@
 """Recomputes the answers of an export of questions from the stored files; imports nothing of pbrs_farm.
 
 `python -m tests.export.question_check ROOT EXPORT` prints each wrong row and exits 1 if there is one.
-ROOT: the output folder that was exported. Distances come from points on house.glb's meshes, read with
-trimesh; everything else from view.json, house.json and the words of the question.
+ROOT: the exported output folder. Distances come from points on house.glb's meshes, read with
+trimesh; everything else from view.json, house.json and the question's words.
 """
 
 from __future__ import annotations
@@ -21,15 +21,15 @@ from scipy.spatial import cKDTree
 
 Array = NDArray[np.float64]
 
-_SPACING_M: Final = 0.008  # of points on a mesh
+_SPACING_M: Final = 0.008  # between points on a mesh
 _ROUNDING_M: Final = 0.05  # of an answer in metres with one decimal
 _SLACK_M: Final = 0.006  # of a distance between points of that spacing
 _NOTICED: Final = 1e-4  # share of a picture's pixels
-_CONE_DEG: Final = 10.0  # of a direction, at least so far from the border to another
+_CONE_DEG: Final = 10.0  # least angle of a direction from the border to the next
 
 
 class _Home:
-    """The meshes of a house.glb, as points; what was asked for is kept."""
+    """The meshes of a house.glb as points, cached."""
 
     def __init__(self, file: Path) -> None:
         self._scene = trimesh.load(file, force="scene")
@@ -42,7 +42,7 @@ class _Home:
         self._trees: dict[str, cKDTree] = {}
 
     def points(self, node: str) -> Array:
-        """Points on the meshes of a node and below it, none farther than _SPACING_M from the next."""
+        """Points on the meshes of a node and its children, none farther than _SPACING_M from the next."""
         if node not in self._points:
             parts = []
             for name in self._nodes[node]:
@@ -53,16 +53,16 @@ class _Home:
         return self._points[node]
 
     def tree(self, node: str) -> cKDTree:
-        """The same points, to be searched."""
+        """A search tree of the same points."""
         if node not in self._trees:
             self._trees[node] = cKDTree(self.points(node))
         return self._trees[node]
 
 
 def _points_on(triangles: Array) -> Array:
-    """(N, 3) corners of (M, 3, 3) triangles that are halved until no edge is longer than 2 _SPACING_M.
+    """(N, 3) corners of (M, 3, 3) triangles, halved until no edge is longer than 2 _SPACING_M.
 
-    The longest edge is halved, so that a long thin triangle gives points along it alone.
+    The longest edge is halved, so that a long thin triangle only gets points along it.
     """
     done = []
     while len(triangles):
@@ -106,11 +106,11 @@ class _Scene:
                     self.rows[row["id"]] = row
 
     def points(self, instance: int) -> Array:
-        """Points on the surface of a thing, none farther than _SPACING_M from the next."""
+        """Points on an item's surface, none farther than _SPACING_M from the next."""
         return self.home.points(self.rows[instance]["item"])
 
     def tree(self, instance: int) -> cKDTree:
-        """The same points, to be searched."""
+        """A search tree of the same points."""
         return self.home.tree(self.rows[instance]["item"])
 
     def middle(self, instance: int) -> Array:
@@ -118,7 +118,7 @@ class _Scene:
         return np.array(self.rows[instance]["box3d"]["centre"])[[0, 2]]
 
     def namesakes(self, instance: int) -> list[int]:
-        """Instances that may be noticed and that a question would call by the same word."""
+        """Noticeable instances that a question would call by the same word."""
         row = self.rows[instance]
         outside = {i["id"] for i in self.house["items"] if "outside" in i.get("tags", ())}
         return [
@@ -129,14 +129,14 @@ class _Scene:
 
 def _word(row: dict[str, Any]) -> str:
     name = str(row["class"])
-    own = re.search(r"\b(bench|stool|ottoman|pouf)\b", str(row["name"]).lower())
-    if name == "chair" and own:
-        return own[0]
+    seat = re.search(r"\b(bench|stool|ottoman|pouf)\b", str(row["name"]).lower())
+    if name == "chair" and seat:
+        return seat[0]
     return re.sub(r"[\d ]+$", "", str(row["name"])).lower() if name.startswith("other") else name
 
 
 def wrong_answers(root: Path, export: Path) -> list[str]:
-    """A line for each question of EXPORT/questions.jsonl whose answer the files of ROOT deny."""
+    """A line for each question of EXPORT/questions.jsonl whose answer contradicts the files of ROOT."""
     scenes: dict[str, _Scene] = {}
     wrong = []
     for line in (export / "questions.jsonl").read_text("utf-8").splitlines():
@@ -159,8 +159,8 @@ def _fault(scene: _Scene, row: dict[str, Any]) -> str:
     if kind != "object_counting" and any(len(scene.namesakes(k)) != 1 for k in about):
         return "a word fits more than one thing"
     if kind == "object_counting":
-        found = scene.namesakes(about[0])
-        return "" if len(found) == int(truth) == len(about) else f"there are {len(found)}"
+        namesakes = scene.namesakes(about[0])
+        return "" if len(namesakes) == int(truth) == len(about) else f"there are {len(namesakes)}"
     if kind == "object_abs_distance":
         gap = _gap_m(scene, *about)
         return "" if abs(gap - float(truth)) <= _ROUNDING_M + _SLACK_M else f"it is {gap:.3f} m"
@@ -188,15 +188,15 @@ def _fault(scene: _Scene, row: dict[str, Any]) -> str:
 
 
 def _fits(row: dict[str, Any], word: str) -> bool:
-    """The word is the class's, or holds it ("row of books"), or is the thing's own or its kind's."""
-    known = {"night stand": "nightstand", "floor mat": "rug", "shelves": "shelves"}
-    own = known.get(row["class"], row["class"])
-    return own in word or word in own or word == _word(row) or word == row["kind"]
+    """True if the word is the class, contains it ("row of books"), or is the item's name or kind."""
+    synonyms = {"night stand": "nightstand", "floor mat": "rug", "shelves": "shelves"}
+    noun = synonyms.get(row["class"], row["class"])
+    return noun in word or word in noun or word == _word(row) or word == row["kind"]
 
 
 def _gap_m(scene: _Scene, a: int, b: int) -> float:
     tree, points = scene.tree(b), scene.points(a)
-    # Some points bound the distance, and most others are then left at once.
+    # A sample of the points bounds the distance, which excludes most others.
     bound = float(tree.query(points[:: max(1, len(points) // 500)])[0].min())
     nearer = tree.query(points, distance_upper_bound=bound + 1e-9)[0]
     return min(bound, float(nearer.min()))
@@ -204,8 +204,8 @@ def _gap_m(scene: _Scene, a: int, b: int) -> float:
 
 def _angle_deg(stand: Array, face: Array, to: Array) -> float:
     """Clockwise seen from above (y up): right is positive. Plan angles of x and z, subtracted."""
-    ahead, there = face - stand, to - stand
-    turn = np.arctan2(there[1], there[0]) - np.arctan2(ahead[1], ahead[0])
+    ahead, target = face - stand, to - stand
+    turn = np.arctan2(target[1], target[0]) - np.arctan2(ahead[1], ahead[0])
     return float(np.degrees((turn + np.pi) % (2 * np.pi) - np.pi))
 
 
@@ -241,19 +241,19 @@ def _area_entered_m2(scene: _Scene) -> float:
 
 
 def _is_inside(ring: Array, place: Array) -> bool:
-    """By crossings of a ray along x."""
+    """By the number of crossings of a ray along x."""
     a, b = ring, np.roll(ring, -1, axis=0)
     crosses = (a[:, 1] > place[1]) != (b[:, 1] > place[1])
     with np.errstate(divide="ignore", invalid="ignore"):
-        at = a[:, 0] + (place[1] - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
-    return bool((crosses & (at > place[0])).sum() % 2)
+        crossings = a[:, 0] + (place[1] - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
+    return bool((crosses & (crossings > place[0])).sum() % 2)
 
 
 def _fault_of_route(scene: _Scene, stops: list[int], turns: list[str]) -> str:
     places = [scene.middle(k) for k in stops]
     for k, turn in enumerate(turns):
-        before, at, after = places[k : k + 3]
-        angle = _angle_deg(at, at + (at - before), after)
+        before, place, after = places[k : k + 3]
+        angle = _angle_deg(place, place + (place - before), after)
         right = {"turn right": 55 < angle < 125, "turn left": -125 < angle < -55}.get(
             turn, abs(angle) > 145
         )
@@ -263,7 +263,7 @@ def _fault_of_route(scene: _Scene, stops: list[int], turns: list[str]) -> str:
 
 
 def main(words: list[str]) -> int:
-    """Print what is wrong; 1 if something is."""
+    """Print wrong answers; 1 if there are any."""
     wrong = wrong_answers(Path(words[0]), Path(words[1]))
     sys.stdout.write(("\n".join(wrong) or "all answers are right") + "\n")
     return int(bool(wrong))

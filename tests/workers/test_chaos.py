@@ -332,7 +332,7 @@ def test_a_forged_message_ends_no_worker(farm: SmallFarm) -> None:
     farm.check_complete(n_repeats=0)
     logs = "".join(p.read_text() for p in farm.folder.glob("w*.log"))
     assert logs.count("dropped an invalid message") == len(forged) - 1
-    assert "celery.backend_cleanup" in logs  # an unregistered task, told and thrown away
+    assert "celery.backend_cleanup" in logs  # an unregistered task, logged and discarded
     assert all(farm.processes[name].poll() is None for name in ("w1", "w2"))
 
 

@@ -1,6 +1,6 @@
 """Every generated item and family has the shape that recorded_things.csv records for two seeds.
 
-`python -m tests.furnishings.things.test_recorded_things` writes the file anew, after a change that is meant. If
+`python -m tests.furnishings.things.test_recorded_things` writes the file again, after an intended change. If
 families change, raise their VERSION first: the digest of dressed homes contains it, not the code.
 """
 

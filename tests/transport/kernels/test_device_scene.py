@@ -58,7 +58,7 @@ def test_the_faster_test_finds_the_same_faces(
 
 
 def test_a_ray_that_slips_out_through_the_faster_test_is_traced_again(tables: SceneTables) -> None:
-    # Without the most-hit faces the tree stands in for one with gaps along its edges.
+    # Without the most-hit faces the tree is like one with gaps along its edges.
     import mitsuba as mi
 
     from pbrs_farm.transport.kernels.device_scene import DeviceScene
