@@ -84,3 +84,11 @@ def test_every_page_is_in_the_sites_navigation() -> None:
     nav = (REPO / "mkdocs.yml").read_text(encoding="utf-8")
     for page in PAGES:
         assert f": {page.relative_to(REPO / 'docs')}" in nav, page
+
+
+def test_the_sites_tabs_are_the_first_level_of_its_navigation() -> None:
+    text = (REPO / "mkdocs.yml").read_text(encoding="utf-8")
+    nav = text.partition("nav:\n")[2]
+    tabs = ["Start", "How-to", "Homes", "Pictures", "Many machines", "Reference", "Developers", "Lab book"]  # fmt: skip
+    assert re.findall(r"^  - (.+):$", nav, re.MULTILINE) == tabs
+    assert "navigation.tabs" in text
