@@ -135,7 +135,7 @@ def test_nothing_is_placed_on_the_contents_of_a_table(models: dict[str, pf.Model
     placed = scattered_poses(home, [models["middle"]], 1, [supports["table"]], 1)
     outline, _low, _high = _outline(*placed[0])
     assert outline.bounds[0] > 3.4
-    with pytest.raises(BadInput, match=r"takes [1-3] of 20 things"):
+    with pytest.raises(BadInput, match=r"has space for [1-3] of 20 objects"):
         scattered_poses(home, [models["middle"]], 20, [supports["table"]], 1)
 
 

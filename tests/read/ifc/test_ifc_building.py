@@ -230,7 +230,7 @@ def test_older_and_draft_schemas_are_read_as_their_family(
 
 
 DAMAGED = {
-    "schema": (lambda t: t.replace("'IFC4'", "'IFC151'"), "is IFC151, which is not read"),
+    "schema": (lambda t: t.replace("'IFC4'", "'IFC151'"), "is IFC151, which is not supported"),
     "empty": (lambda t: "", "is empty"),
     "xml": (lambda t: "<?xml version='1.0'?><ifcXML/>", "IFCXML"),
     "json": (lambda t: '{"header": {}}', "IFC5"),

@@ -172,7 +172,7 @@ def test_a_folders_name_may_hold_a_colon() -> None:
 
 def test_shares_leave_something_to_the_views(root: Path, sequences: Path) -> None:
     mix = (Mix(str(sequences), 0.6), Mix(str(sequences), 0.4))
-    with pytest.raises(BadInput, match="must sum to less 1"):
+    with pytest.raises(BadInput, match="must sum to less than 1"):
         training_views(TrainingSource((str(root),), mix=mix), small_plan())
 
 
