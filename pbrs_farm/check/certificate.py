@@ -46,17 +46,30 @@ class Certificate(Record):
     coincident: tuple[Coincidence, ...] = ()  # most pixels first
     looked_at: tuple[str, ...] = ()  # "file (views): how"
     not_looked_at: tuple[str, ...] = ()  # the same, and facts that no file holds
+    unfinished: tuple[str, ...] = ()  # "house: finished and planned views" of houses still rendered
+
+    @property
+    def has_failed(self) -> bool:
+        """True if a check failed."""
+        return any(c.failed for c in self.counts.values())
 
     @property
     def is_clean(self) -> bool:
-        """True if nothing failed and there is a finished view; ties and notes are allowed."""
-        return self.n_views > 0 and not any(c.failed for c in self.counts.values())
+        """True if nothing failed, nothing is unfinished, and there is a view; ties and notes are allowed."""
+        return self.n_views > 0 and not self.unfinished and not self.has_failed
+
+    @property
+    def verdict(self) -> str:
+        """CLEAN, NOT FINISHED, or NOT CLEAN."""
+        if self.unfinished and not self.has_failed:
+            return "NOT FINISHED"
+        return "CLEAN" if self.is_clean else "NOT CLEAN"
 
     def text(self) -> str:
         """The certificate as lines for a terminal.
 
-        A table of all checks, the files with and without checks, the listed failures, and CLEAN or
-        NOT CLEAN as the last line, which scripts may look for.
+        A table of all checks, the files with and without checks, the listed failures, and the verdict as
+        the last line, which scripts may look for.
         """
         pixels = "every pixel" if self.all_pixels else "a sample of pixels"
         lines = [
@@ -71,9 +84,10 @@ class Certificate(Record):
         lines += [f"note: {note}" for note in self.notes]
         lines += self._coincidences()
         lines += list(self.failures)
+        lines += _block("not finished", self.unfinished)
         if self.n_views == 0:
             lines.append("nothing to verify: no finished view in this folder")
-        lines.append("CLEAN" if self.is_clean else "NOT CLEAN")
+        lines.append(self.verdict)
         return "\n".join(lines)
 
     def _coincidences(self) -> list[str]:
@@ -191,6 +205,7 @@ class Tally:
         all_pixels: bool,
         looked_at: tuple[str, ...] = (),
         not_looked_at: tuple[str, ...] = (),
+        unfinished: tuple[str, ...] = (),
     ) -> Certificate:
         """The certificate of everything counted so far, with checks in the order of their first count."""
         return Certificate(
@@ -204,6 +219,7 @@ class Tally:
             },
             failures=tuple(line for lines in self._listed.values() for line in lines),
             notes=tuple(self.notes),
+            unfinished=unfinished,
             looked_at=tuple(shown(line, MAX_MESSAGE) for line in looked_at),
             not_looked_at=tuple(shown(line, MAX_MESSAGE) for line in not_looked_at),
             # The pairs that share the most pixels come first.

@@ -20,6 +20,7 @@ from pbrs_farm.check.cases import SAMPLE, HouseCase, RootCase, ScenesInTime, See
 from pbrs_farm.check.certificate import Certificate, Tally
 from pbrs_farm.check.checks import Subject, checks
 from pbrs_farm.check.fields import stored_fields
+from pbrs_farm.check.file_checks import unfinished_houses
 from pbrs_farm.check.light_checks import may_be_halved
 from pbrs_farm.check.methods import looked_at, not_looked_at
 from pbrs_farm.check.stored_files import BadFile, stored_bytes
@@ -66,10 +67,11 @@ def verify(
         )
         views, n_halved = views + of_house, n_halved + halved
     _judge_ties(tally)
+    rendered = unfinished_houses(folder, houses)
     fields = stored_fields(folder, houses)
     return tally.certificate(
         str(folder), len(houses), len(views), all_pixels=all_pixels,
-        looked_at=looked_at(views, fields), not_looked_at=not_looked_at(folder, houses, views, fields, n_halved),
+        unfinished=tuple(rendered.values()), looked_at=looked_at(views, fields), not_looked_at=not_looked_at(folder, houses, views, fields, n_halved),
     )  # fmt: skip
 
 

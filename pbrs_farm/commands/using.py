@@ -6,7 +6,7 @@ import argparse
 import math
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Final
 
 from pbrs_farm.commands.arguments import (
     VIEW,
@@ -26,6 +26,10 @@ if TYPE_CHECKING:
     from pbrs_farm.gallery.sheet_parts import SheetParts
     from pbrs_farm.run.relight import LampFactor
     from pbrs_farm.transport.validation.claims import LightClaim
+
+
+_UNFINISHED: Final = 3
+"""Exit code of `verify` for a folder that a run still fills, if nothing else is wrong."""
 
 
 def add_verbs(verb: Verb) -> None:
@@ -136,7 +140,8 @@ def _verify_folder(args: argparse.Namespace) -> int:
         echo_json(certificate.model_dump(mode="json"))
     else:
         echo(certificate.text())
-    return 0 if certificate.is_clean else 1
+    unfinished = _UNFINISHED if certificate.verdict == "NOT FINISHED" else 1
+    return 0 if certificate.is_clean else unfinished
 
 
 def _verify_light(args: argparse.Namespace) -> int:

@@ -1,10 +1,15 @@
 import json
 import os
+import shutil
 from pathlib import Path
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from pbrs_farm.check import verify
+from pbrs_farm.check.choice_checks import count_range
+from pbrs_farm.cli import main
 from pbrs_farm.core.errors import BadInput
 from tests.check.roots import changed_pixel, failed, house_of
 
@@ -107,3 +112,47 @@ def test_a_folder_that_is_no_output_root_is_refused(tmp_path):
 def test_a_root_without_views_is_not_clean(tmp_path):
     (tmp_path / "houses/empty").mkdir(parents=True)
     assert not verify(tmp_path).is_clean
+
+
+def test_a_folder_that_a_run_still_fills_is_not_finished(root, capsys):
+    house = house_of(root)
+    shutil.rmtree(house / "views/v1")
+    for file in (root / "manifest.jsonl", house / "manifest.jsonl", *house.glob("done/*.v1.json")):
+        file.unlink()
+    certificate = verify(root, all_pixels=True)
+    assert certificate.verdict == "NOT FINISHED", certificate.text()
+    assert not certificate.is_clean
+    (line,) = certificate.unfinished
+    assert line.startswith(f"{house.name}: 1")
+    assert line.endswith("views are finished")
+    assert main(["verify", str(root)]) == 3
+    assert capsys.readouterr().out.rstrip().endswith("\nNOT FINISHED")
+    # A false label is still found.
+    picture = house / "views/v0/depth.png"
+    picture.write_bytes((house / "views/v0/instance.png").read_bytes())
+    assert verify(root).verdict == "NOT CLEAN"
+
+
+def test_a_manifest_that_is_missing_from_a_finished_root_is_caught(root):
+    (house_of(root) / "manifest.jsonl").unlink()
+    assert "files" in failed(root, all_pixels=False)
+
+
+def test_a_front_that_coincides_with_another_counts_for_either():
+    quad = np.array([[-1, -1, -2], [1, -1, -2], [1, 1, -2], [-1, 1, -2]], np.float32)
+    moves = np.array([[0, 0, 0], [0, 0, -0.5], [0.5, 0, 0]], np.float32)
+    vertices = (quad + moves[:, None]).reshape(-1, 3)
+    faces = np.array(
+        [[k, k + 1, k + 2] for k in (0, 4, 8)] + [[k, k + 2, k + 3] for k in (0, 4, 8)]
+    )
+    triangles = SimpleNamespace(
+        vertices=vertices, faces=faces, has_holes=np.zeros(6, bool),
+        instance=np.array([1, 2, 3, 1, 2, 3]),
+    )  # fmt: skip
+    case = SimpleNamespace(rest=SimpleNamespace(triangles=triangles))
+    x, y = np.meshgrid(np.linspace(-0.45, 0.45, 30), np.linspace(-0.4, 0.4, 30))
+    directions = np.stack([x.ravel(), y.ravel(), -np.ones(x.size)], axis=1)
+    # Item 3 shares the plane of item 1 from x = -0.5 on; item 2 is behind both.
+    shared = int((x > -0.25).sum())
+    ranges = [count_range(case, k, np.zeros(3), directions) for k in (1, 2, 3)]
+    assert ranges == [(x.size - shared, x.size), (0, 0), (0, shared)]
