@@ -1,12 +1,16 @@
 """Drop models into a home until they come to rest: rigid bodies by MuJoCo, convex parts by CoACD.
 
-No effects. The home is static. Supports collide triangle by triangle (a thin prism each), other
-furniture nearby as its convex hull. Models start a few centimetres above free places of
+Effects: a cache of convex parts below cache_folder(). The home is static. Supports collide triangle
+by triangle (a thin prism each), other furniture nearby as its convex hull. Models start a few centimetres above free places of
 `dress.supports`, tumble, and stay where they stop; those that fall off are dropped again.
 """
 
 from __future__ import annotations
 
+import contextlib
+import io
+import sys
+import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
@@ -15,6 +19,8 @@ from typing import Any, Final
 import numpy as np
 from scipy.spatial.transform import Rotation
 
+from pbrs_farm.assets.debian import cache_folder, write_whole
+from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.house import House, Item, ItemKind, corners_of_surfaces
@@ -39,6 +45,7 @@ _PRISM_M: Final = 0.03  # depth of a level triangle's prism, metres; stops tunne
 _THIN_M: Final = 0.002  # depth of the other prisms, metres
 _LEAST_M2: Final = 1e-6  # minimum area of a triangle, square metres
 _MOST_PRISMS: Final = 6_000
+_PARTS_FORMAT: Final = b"convex parts 1"  # changed when convex_parts returns others
 _DENSITY: Final = 500.0  # kg/m3
 _FALLEN_M: Final = 0.05  # depth below its surface at which a model has fallen off, metres
 
@@ -65,7 +72,7 @@ def settled_poses(
     things = [_Body(models[int(rng.integers(len(models)))], None, np.eye(4)) for _ in range(n)]
     size = max(float(np.linalg.norm(t.model.size_m)) for t in things)
     surfaces = level_tops_of(house, targets, border_m=size)
-    parts = {thing.model: _parts_of(thing.model) for thing in things}
+    parts = {thing.model: convex_parts_of(thing.model) for thing in things}
     statics = _static_solids(house, surfaces, size)
     waiting = list(things)
     for _ in range(_ROUNDS):
@@ -91,7 +98,7 @@ def penetration_m(
     """
     mujoco = mujoco_module()
     things = [_Body(model, None, pose) for model, pose in placed]
-    parts = {thing.model: _parts_of(thing.model) for thing in things}
+    parts = {thing.model: convex_parts_of(thing.model) for thing in things}
     size = max(float(np.linalg.norm(model.size_m)) for model, _pose in placed)
     statics = _static_solids(house, level_tops_of(house, targets), size)
     world = mujoco.MjModel.from_xml_string(world_xml([parts[t.model] for t in things], statics))
@@ -102,9 +109,28 @@ def penetration_m(
 
 
 @lru_cache(maxsize=256)
-def _parts_of(model: Model) -> tuple[F64, ...]:
-    """Convex parts of a model, (V, 3) vertices each in its frame; cached per process."""
-    return convex_parts(model.shape.triangles)
+def convex_parts_of(model: Model) -> tuple[F64, ...]:
+    """Convex parts of a model, (V, 3) vertices each in its frame; cached in memory and on disk.
+
+    CoACD may take a minute for a hollow model, so a terminal shows its name.
+    """
+    triangles = np.ascontiguousarray(model.shape.triangles, np.float64)
+    name = keys.sha256(triangles.tobytes() + _PARTS_FORMAT)[:32]
+    path = cache_folder() / "convex" / f"{name}.npz"
+    try:
+        with np.load(path) as arrays:
+            return tuple(arrays[key] for key in sorted(arrays.files))
+    except (OSError, ValueError, zipfile.BadZipFile):
+        pass  # not cached, or damaged
+    if sys.stderr.isatty():
+        sys.stderr.write(f"convex parts of {model.id} ({len(triangles)} faces) ...\n")
+    parts = convex_parts(triangles)
+    data = io.BytesIO()
+    np.savez(data, **{f"{k:03}": part for k, part in enumerate(parts)})
+    with contextlib.suppress(OSError):  # without a cache the next process computes them again
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(path, data.getvalue())
+    return parts
 
 
 def _static_solids(house: House, surfaces: Sequence[TargetTops], size_m: float) -> list[F64]:

@@ -156,3 +156,12 @@ def test_a_front_that_coincides_with_another_counts_for_either():
     shared = int((x > -0.25).sum())
     ranges = [count_range(case, k, np.zeros(3), directions) for k in (1, 2, 3)]
     assert ranges == [(x.size - shared, x.size), (0, 0), (0, shared)]
+
+
+def test_a_glazed_door_may_be_recorded_as_a_window(root):
+    file = house_of(root) / "house.json"
+    house = json.loads(file.read_text())
+    doors = {item["id"] for item in house["items"] if item["kind"] == "door"}
+    next(o for o in house["openings"] if o["item_id"] in doors)["is_window"] = True
+    file.write_text(json.dumps(house))
+    assert "openings" not in failed(root, all_pixels=False)

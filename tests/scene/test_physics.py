@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.scene import physics
 from tests.scene.homes import can, crate, small_home
 
 
@@ -29,3 +30,23 @@ def test_dropped_items_rest_on_their_support(on: str, tmp_path: Path) -> None:
 def test_what_cannot_be_dropped_is_told(tmp_path: Path) -> None:
     with pytest.raises(BadInput, match=r"no space above it|no level surface"):
         small_home().scatter([can(tmp_path)], 1, on="ceiling_0_0", physics=True)
+
+
+def test_convex_parts_are_computed_once_for_all_processes(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setenv("PBRS_CACHE", str(tmp_path / "cache"))
+    model, calls = crate(tmp_path), []
+    real = physics.convex_parts
+    monkeypatch.setattr(physics, "convex_parts", lambda t: calls.append(len(t)) or real(t))
+    found = []
+    for _ in range(3):
+        physics.convex_parts_of.cache_clear()  # as in another process
+        found.append(physics.convex_parts_of(model))
+        if len(found) == 2:
+            (file,) = (tmp_path / "cache/convex").glob("*.npz")
+            file.write_bytes(b"damaged")
+    assert len(calls) == 2
+    for parts in found[1:]:
+        for part, other in zip(parts, found[0], strict=True):
+            np.testing.assert_array_equal(part, other)
