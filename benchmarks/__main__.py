@@ -32,7 +32,7 @@ BENCHES: Final = {
     "selection": Bench("selection", "docs/selection.md: the paper's scale", 0.5, is_short=True),
     "homes": Bench("homes.homes", "README, docs/homes.md: planning, cameras; label shares of dressed homes", 5.5),
     "house_cost": Bench("homes.house_cost", "CPU and memory of a home and of a further view", 2.5),
-    "look": Bench("views.look", "docs/cameras.md: cut items, added lamps, noise behind glass", 9),
+    "look": Bench("views.look", "docs/cameras.md: cut items, added lamps, noise behind glass", 9, in_all=False),
     "variety": Bench("homes.variety", "docs/dress/catalogue.md: models in dressed homes", 4),
     "joints": Bench("homes.joints", "docs/howto/simulators.md: doors and drawers, also in MuJoCo", 3),
     "light": Bench("light.light_cost", "docs/light_costs.md: error and CPU by samples, presets, size", 4),

@@ -159,7 +159,7 @@ class _MirroredPath:
         self.depth = dr.select(first, path.depth, self.depth)
         # Its vertices take other random dimensions than those behind the glass.
         self.n_nulls = dr.select(first, path.n_nulls + _NULLS_APART, self.n_nulls)
-        self.rest = dr.select(first, ray.own_share, self.rest)
+        self.rest = dr.select(first, ray.share, self.rest)
         self.share = dr.select(first, 1 - ray.share, self.share)
         self.waits, self.met = self.waits | (first & ray.is_followed), self.met | first
 

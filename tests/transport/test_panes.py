@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
-from pbrs_farm.core.house import NOTHING_LEFT, House, Material, MaterialKind
+from pbrs_farm.core.house import NOTHING_LEFT, House, Material, MaterialKind, Surface
 from pbrs_farm.core.recipe import LightFields, Recipe, recipe_from_name
 from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.light_scene import LightScene
@@ -122,3 +124,30 @@ def test_metropolis_mirrors_as_path_does() -> None:
     )
     by_chains = scene.render(camera, "0_0", chains, 1).indoor
     assert by_chains.mean() == pytest.approx(by_path.mean(), rel=0.05)
+
+
+@pytest.mark.parametrize("kind", [MaterialKind.PANE, MaterialKind.GLASS])
+def test_the_pilot_and_the_guides_of_the_denoiser_look_through_glass(kind: MaterialKind) -> None:
+    # Two rooms with a lamp each, and a sheet of glass between them.
+    def wall(low: rooms.Triple, high: rooms.Triple, material: int = 0) -> Surface:
+        return rooms.box(low, high, material)
+
+    shell = [wall((-2, -0.1, -3), (2, 0, 3)), wall((-2, 2.5, -3), (2, 2.6, 3))]
+    shell += [wall((x, 0, -3), (x + 0.1, 2.5, 3)) for x in (-2.1, 2)]
+    shell += [wall((-2, 0, 3), (2, 2.5, 3.1)), wall((-2, 0, -3.1), (2, 2.5, -3), 1)]
+    glass = rooms.quad([(-2, 0, 0), (2, 0, 0), (2, 2.5, 0), (-2, 2.5, 0)], 2)
+    materials = [rooms.matte("grey", 0.3), rooms.matte("red", 0.8, 0.1, 0.1)]
+    materials += [Material("glass", kind=kind, opacity=0.0), Material("b", MaterialKind.BULB)]
+    lamps = [rooms.bulb((0.5, 2.2, z), 3, 1000.0) for z in (2.0, -2.0)]
+    home = rooms.house([*shell, glass], materials, lamps=lamps)
+    plan = np.array([[-2, 0], [2, 0], [2, 3], [-2, 3]], np.float64)
+    halves = (replace(home.rooms[0], polygon=plan), replace(home.rooms[0], polygon=plan - [0, 3]))
+    home = replace(home, rooms=halves)
+    scene = LightScene.load(home, {}, RECIPE, dark_sky())
+    camera = rooms.camera((0, 1.2, 2.5), (0, 1.2, 0), 16, 12, 0.5)
+    found = scene.render(camera, "0_0", FIELDS.model_copy(update={"pilot_spp": 4}), 1)
+    # The camera sees nothing but the glass, and the red wall behind it.
+    _near, behind = found.facts["lamp_weights"].values()
+    assert behind > 0.3
+    assert (found.albedo[..., 0] > 5 * found.albedo[..., 1]).all()
+    assert np.ptp(found.albedo[..., 0]) < 0.05

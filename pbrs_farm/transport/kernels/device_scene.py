@@ -362,7 +362,7 @@ class Panes:
     """
 
     def __init__(self, tables: SceneTables) -> None:
-        """tables: of the panes alone, as clear thin glass (`panes_of_house`)."""
+        """tables: of the panes alone (`panes_of_house`)."""
         self._scene = DeviceScene(tables)
 
     def move(self, positions: F32, faces: NDArray[np.uint32], rows: F32) -> None:
@@ -372,12 +372,12 @@ class Panes:
 
     def before(
         self, si: SurfaceInteraction, o: Any, d: Any, looks: Any
-    ) -> tuple[SurfaceInteraction, Any]:
-        """(what a ray meets first of si and the panes, Bool: it is a pane), where looks is True.
+    ) -> tuple[SurfaceInteraction, Any, Any]:
+        """(what a ray meets first of si and the panes, Bool: it is a pane, Bool: one between rooms).
 
-        si: what the ray of origin o (Point3f) and direction d (unit Vector3f) meets at home.
+        looks: Bool, where panes count. si: what the ray of origin o (Point3f) and direction d (unit Vector3f) meets at home.
         """
-        is_pane, p, n = self._nearer(si.valid, si.p, o, d, looks)
+        is_pane, is_inner, p, n = self._nearer(si.valid, si.p, o, d, looks)
         n = dr.select(is_pane, n, si.n)
         clear = Bsdf(
             kd=dr.select(is_pane, 0, si.bsdf.kd),
@@ -395,19 +395,21 @@ class Panes:
             bsdf=clear,
             is_cutout=si.is_cutout & ~is_pane,
         )
-        return nearest, is_pane
+        return nearest, is_pane, is_inner
 
     @dr.syntax
-    def _nearer(self, valid: Any, at: Any, o: Any, d: Any, looks: Any) -> tuple[Any, Any, Any]:
-        """(Bool: a pane is in front of the point at, the hit on it, its normal)."""
-        is_pane, p, n = mi.Bool(False), mi.Point3f(0), mi.Vector3f(0, 1, 0)
+    def _nearer(self, valid: Any, at: Any, o: Any, d: Any, looks: Any) -> tuple[Any, Any, Any, Any]:
+        """(Bool: a pane is in front of the point at, Bool: one between rooms, its hit and normal)."""
+        is_pane, is_inner = mi.Bool(False), mi.Bool(False)
+        p, n = mi.Point3f(0), mi.Vector3f(0, 1, 0)
         # Branch: packets of lanes whose rays were all scattered pass by.
         if looks:
             pane = self._scene.intersect(o, d, looks)
             is_behind = valid & (dr.dot(at - o, d) <= dr.dot(pane.p - o, d))
             is_pane = looks & pane.valid & ~is_behind
+            is_inner = is_pane & (pane.bsdf.kind == MIRROR)
             p, n = mi.Point3f(pane.p), mi.Vector3f(pane.ng)
-        return is_pane, p, n
+        return is_pane, is_inner, p, n
 
 
 def bend_normal(n: Any, d: Any) -> Any:

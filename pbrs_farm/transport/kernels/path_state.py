@@ -93,6 +93,7 @@ class Vertex(NamedTuple):
     dim: Any  # its first random dimension
     near: NearbyLamps | None  # None: lamps do not count
     is_pane: Any = None  # Bool: glass of a window; None for scenes without any
+    is_inner: Any = None  # Bool: such glass between two rooms
     splits: Any = None  # Bool: glass at which rays go through and the caller follows the others
     is_behind: Any = None  # Bool: glass behind such, which neither mirrors nor dims
 
@@ -141,8 +142,7 @@ class MirroredRay(NamedTuple):
     o: Any
     d: Any
     beta: Any  # throughput
-    share: Any  # about, of the light that comes by the glass
-    own_share: Any  # the same, over the chance that it is followed
+    share: Any  # of the reflection in the guides; 0 if it is followed by chance
 
 
 class WhiteSplit(NamedTuple):

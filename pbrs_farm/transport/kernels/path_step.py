@@ -151,9 +151,10 @@ def advance(
 def _next_vertex(context: PathContext, path: PathState, active: Any) -> Vertex:
     """Hit of the path's ray."""
     si, is_pane = context.scene.intersect(path.o, path.d, active), None
+    is_inner = None
     if context.scene.panes is not None:
         looks = active & (path.bsdf_pdf <= 0)
-        si, is_pane = context.scene.panes.before(si, path.o, path.d, looks)
+        si, is_pane, is_inner = context.scene.panes.before(si, path.o, path.d, looks)
     if context.splits_white:
         si = si._replace(bsdf=si.bsdf._replace(kd=dr.maximum(si.bsdf.kd, LEAST_KD)))
     is_solid = si.valid & ~si.is_cutout
@@ -185,7 +186,19 @@ def _next_vertex(context: PathContext, path: PathState, active: Any) -> Vertex:
         splits = is_pane | (straight & ~path.met_glass)
         is_behind = straight & ~splits
     return Vertex(
-        si, frame, wi, is_glass, is_mirror, is_rough, depth, dim, near, is_pane, splits, is_behind
+        si,
+        frame,
+        wi,
+        is_glass,
+        is_mirror,
+        is_rough,
+        depth,
+        dim,
+        near,
+        is_pane,
+        is_inner,
+        splits,
+        is_behind,
     )
 
 
@@ -200,7 +213,7 @@ def _choose_lobe(emitters: Emitters, vertex: Vertex, path: PathState, u: Any) ->
         often = reflection_probability(reflectance, survival_boost(vertex.near))
         probability = dr.select(path.bsdf_pdf > 0, often, reflectance)
     if vertex.is_pane is not None:
-        mirrored = _mirrored_share(emitters, reflectance)
+        mirrored = _mirrored_share(emitters, reflectance, vertex.is_inner)
         probability = dr.select(vertex.is_pane, mirrored, probability)
     if vertex.splits is not None:
         probability = dr.select(vertex.splits | vertex.is_behind, 0, probability)
@@ -209,9 +222,13 @@ def _choose_lobe(emitters: Emitters, vertex: Vertex, path: PathState, u: Any) ->
     return _Lobe(u, reflectance, probability, reflected)
 
 
-def _mirrored_share(emitters: Emitters, reflectance: Any) -> Any:
-    """Share of rays reflected at a pane: about in proportion to the light, at most half."""
-    odds = reflectance / (reflectance + (1 - reflectance) * emitters.pane_odds)
+def _mirrored_share(emitters: Emitters, reflectance: Any, is_inner: Any) -> Any:
+    """Share of rays reflected at a pane: about in proportion to the light, at most half.
+
+    A room behind a pane is as bright as the one before it, by day and by night.
+    """
+    behind = (1 - reflectance) * dr.select(is_inner, 1, emitters.pane_odds)
+    odds = reflectance / (reflectance + behind)
     return dr.minimum(odds, dr.maximum(reflectance, _MAX_PANE))
 
 
@@ -221,13 +238,17 @@ def _mirrored_ray(
     """Reflection of a path that passes through glass: of a pane by chance if it is faint."""
     si, reflectance = vertex.si, thin_glass_reflectance(vertex.wi.z)
     d = path.d - 2 * dr.dot(si.n, path.d) * si.n
-    is_pane, of_pane = vertex.is_pane, _mirrored_share(emitters, reflectance)
+    is_pane = vertex.is_pane
+    of_pane = _mirrored_share(emitters, reflectance, vertex.is_inner)
     share = dr.select(is_pane, of_pane, reflectance)
     chance = dr.select(is_pane, dr.minimum(_LEAST_FOLLOWED + _FOLLOWED * of_pane, 1), 1)
     beta = path.beta * (reflectance / chance)
     o = offset_ray_origin(si.p, si.ng)
     is_followed = (u < chance) & (dr.dot(d, si.ng) > 0)
-    return MirroredRay(active & vertex.splits, is_followed, o, d, beta, share, share / chance)
+    # A reflection that is followed by chance has no part in the guides: the denoiser takes them as
+    # free of noise.
+    share = dr.select(chance < 1, 0, share)
+    return MirroredRay(active & vertex.splits, is_followed, o, d, beta, share)
 
 
 def _strategy(

@@ -6,13 +6,15 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
+import shapely
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.house import House, Material, MaterialKind, corners_of_surfaces
-from pbrs_farm.core.mesh import face_areas, faces_with_area
+from pbrs_farm.core.house import House, Material, MaterialKind, Surface, corners_of_surfaces
+from pbrs_farm.core.mesh import area_vectors, face_areas, faces_with_area
 
 MAX_PORTALS: Final = 6  # sampled for one view
+_BESIDE_M: Final = 0.35  # from a pane to a point on its side: beyond the wall's face
 
 
 def portals_of_house(house: House) -> F64:
@@ -32,19 +34,50 @@ def portals_of_house(house: House) -> F64:
 
 
 def panes_of_house(house: House) -> House | None:
-    """The house's window panes alone, as clear thin glass; None without panes."""
+    """The house's window panes alone; None without panes.
+
+    Those between two rooms are of the kind mirror, others clear glass.
+    """
     is_pane = [m.kind is MaterialKind.PANE for m in house.materials]
-    items = [
-        replace(i, surfaces=tuple(s for s in i.surfaces if is_pane[s.material]), lights=())
-        for i in house.items
-    ]
     clear = Material("pane", kind=MaterialKind.GLASS, opacity=0.0)
-    materials = tuple(clear if p else m for m, p in zip(house.materials, is_pane, strict=True))
-    panes = replace(house.with_items(i for i in items if i.surfaces), materials=materials)
+    inner, between = len(house.materials), Material("inner pane", kind=MaterialKind.MIRROR)
+
+    def panes_of(surfaces: tuple[Surface, ...]) -> tuple[Surface, ...]:
+        panes = (s for s in surfaces if is_pane[s.material])
+        return tuple(
+            replace(s, material=inner) if _is_between_rooms(house, s) else s for s in panes
+        )
+
+    items = [replace(i, surfaces=panes_of(i.surfaces), lights=()) for i in house.items]
+    materials = [clear if p else m for m, p in zip(house.materials, is_pane, strict=True)]
+    panes = replace(
+        house.with_items(i for i in items if i.surfaces), materials=(*materials, between)
+    )
     has_area = any(
         faces_with_area(corners_of_surfaces(i.surfaces), 1e-6).any() for i in panes.items
     )
     return panes if has_area else None
+
+
+def _is_between_rooms(house: House, pane: Surface) -> bool:
+    """True if a room with a ceiling is on either side of a pane."""
+    corners = corners_of_surfaces([pane])
+    normal = area_vectors(corners)
+    normal = normal[(normal**2).sum(1).argmax()] if len(normal) else np.zeros(3)
+    length = float(np.linalg.norm(normal))
+    if length == 0:
+        return False
+    middle = corners.reshape(-1, 3).mean(0)
+    sides = [middle + sign * _BESIDE_M * normal / length for sign in (-1, 1)]
+    rooms = [room for room in house.rooms if room.has_ceiling]
+    return all(
+        any(
+            room.floor_y <= y <= room.ceiling_y
+            and shapely.contains_xy(shapely.Polygon(room.polygon), x, z)
+            for room in rooms
+        )
+        for x, y, z in sides
+    )
 
 
 def nearest_portals(portals: F64, eye: F64) -> F64:
