@@ -97,6 +97,7 @@ def _catalogue(args: argparse.Namespace) -> int:
         rows = [(note.kind, note.place, note.text) for note in loaded.notes]
         text = io.StringIO(newline="")
         csv.writer(text).writerows([("kind", "model", "reason"), *rows])
+        args.refused.parent.mkdir(parents=True, exist_ok=True)
         args.refused.write_text(text.getvalue(), encoding="utf-8")
     if args.json:
         echo_json(

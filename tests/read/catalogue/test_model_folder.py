@@ -219,7 +219,7 @@ def test_the_verb_lists_usable_models_and_writes_refused_ones(
     monkeypatch.setenv("PBRS_CACHE", str(tmp_path / "cache"))
     put(tmp_path / "own" / "armchair" / "a.glb", box_glb(0.8, 0.9, 0.8))
     put(tmp_path / "own" / "armchair" / "huge.glb", box_glb(7, 9, 7))
-    refused = tmp_path / "refused.csv"
+    refused = tmp_path / "out/refused.csv"
     assert main(["catalogue", str(tmp_path / "own"), "--refused", str(refused)]) == 0
     assert capsys.readouterr().out == (
         "1 piece, 0 pictures\n       1 armchair\n"
