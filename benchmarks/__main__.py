@@ -35,7 +35,7 @@ BENCHES: Final = {
     "look": Bench("views.look", "docs/cameras.md: cut items, added lamps, noise behind glass", 9, in_all=False),
     "variety": Bench("homes.variety", "docs/dress/catalogue.md: models in dressed homes", 4),
     "joints": Bench("homes.joints", "docs/howto/simulators.md: doors and drawers, also in MuJoCo", 3),
-    "light": Bench("light.light_cost", "docs/light_costs.md: error and CPU by samples, presets, size", 4),
+    "light": Bench("light.light_cost", "docs/light_costs.md: error and CPU by samples, presets, size", 4.5),
     "cycles": Bench("renderers.cycles", "docs/compare.md: CPU to equal error against Cycles", 10),
     "film": Bench("film", "docs/motion.md: errors of flow and disparity, noise of films", 2.5),
     "tone": Bench("study.picture_tone", "docs/lab/study.md: tones beside photographs", 3),
