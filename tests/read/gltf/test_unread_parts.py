@@ -32,7 +32,7 @@ def test_each_unread_part_is_noted_once() -> None:
     scene.nodes[-1]["skin"] = 0
     scene.more = {"extensionsUsed": ["EXT_own_shapes", "KHR_lights_punctual"]}
     text = notes_text(scene)
-    assert "EXT_own_shapes is not read" in text
+    assert "EXT_own_shapes is not supported" in text
     assert "KHR_lights_punctual" not in text
     assert "have morph targets" in text
     assert "have points or lines" in text
