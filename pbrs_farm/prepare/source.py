@@ -190,10 +190,11 @@ def _of_saved_home(path: Path, files: SourceFiles | None) -> SourceRef:
 
 def _format_at(path: Path) -> Format:
     """The format of a path; raises BadHouse if a folder or a model is not a home."""
-    entry = format_of_file(path)
+    suffix = path.suffix.lower()
+    # An .obj is a home if its groups say so, else a single model.
+    entry = format_of_file(path, surely=suffix in _MODEL_SUFFIXES)
     if entry is not None:
         return entry
-    suffix = path.suffix.lower()
     if path.is_dir():
         text, hint = _of_folder(path)
         raise BadHouse(path, "", text, hint=hint)

@@ -139,7 +139,7 @@ def moved(world_from_camera: np.ndarray, x: float, z: float) -> np.ndarray:
 
 @pytest.mark.parametrize("text", ["[" + "{}," * 10_001 + "{}]", "1 2 3\n" * 10_001])
 def test_a_file_of_too_many_cameras_is_rejected_before_any_is_built(text: str) -> None:
-    with pytest.raises(BadInput, match="at most 10000 are read"):
+    with pytest.raises(BadInput, match="the maximum is 10000"):
         cameras_from_file_text(text, "mine", 64, 48)
 
 

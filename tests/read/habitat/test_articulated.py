@@ -152,7 +152,7 @@ def test_a_change_of_the_urdf_or_its_models_is_seen(tmp_path: Path) -> None:
         (
             'parent link="root"/><child link="body"',
             'parent link="door"/><child link="body"',
-            "ring",
+            "cycle",
         ),
         ('axis xyz="0 1 0"', 'axis xyz="0 0 0"', "no direction"),
         ('axis xyz="0 1 0"', 'axis xyz="0 nan 0"', "finite numbers"),

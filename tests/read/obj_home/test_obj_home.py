@@ -56,5 +56,5 @@ def test_a_changed_picture_or_library_changes_the_source(tmp_path: Path) -> None
 def test_a_single_model_is_no_home_and_named_so(tmp_path: Path) -> None:
     path = tmp_path / "lamp.obj"
     path.write_text("g floor_lamp\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
-    with pytest.raises(BadHouse, match="is a model, no home: no groups"):
+    with pytest.raises(BadHouse, match="pbrs-farm objects"):
         house(path)
