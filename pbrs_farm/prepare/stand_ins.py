@@ -408,7 +408,7 @@ def _made_for_wall(
     rng = mutable.rng("stand-in", item.id)
     frame = frame_material(rng, style)
     if group == "mirror":
-        piece, shape = mirror(width, height, frame)
+        piece, shape = mirror(rng, width, height, frame)
     else:
         shown = scene.gallery(mutable, style).print_for(width / height).texture
         piece, shape = framed(rng, style, width, height, shown, frame)
