@@ -1,6 +1,6 @@
-"""Custom furniture: plant stands of wood or metal, some with a pot on top.
+"""Custom furniture: racks for one plant, of wood or metal, some with a pot on top.
 
-pbrs-farm run Studio --dress 3 --catalogue generated --out out/stands
+pbrs-farm run Studio --dress 3 --catalogue generated --out out/racks
 """
 
 from __future__ import annotations
