@@ -79,7 +79,7 @@ def test_an_invalid_number_is_refused_without_library_words(text, says):
 def test_a_single_model_names_the_verb_objects(name, tmp_path):
     (tmp_path / name).write_bytes(b"v 0 0 0\n")
     with pytest.raises(BadHouse, match="pbrs-farm objects"):
-        resolve(str(tmp_path / name))
+        read_house(resolve(str(tmp_path / name)), ReadFields())
 
 
 def test_a_single_glb_without_a_floor_names_the_verb_objects(tmp_path):

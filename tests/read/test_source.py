@@ -38,7 +38,7 @@ def test_another_version_of_the_example_homes_is_the_machines_fault() -> None:
 
     example_homes()
     source = resolve("Studio").model_copy(update={"sha256": "0" * 64})
-    with pytest.raises(MachineFailed, match="another Studio"):
+    with pytest.raises(MachineFailed, match="Studio differs"):
         read_house(source, ReadFields())
 
 

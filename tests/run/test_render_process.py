@@ -164,7 +164,7 @@ def test_a_process_over_its_memory_is_killed_even_while_it_talks() -> None:
         child.at(k / 4, "event")
     _heard, ended = bench.run()
     assert ended.cause == "resource"
-    assert "501 MB resident, 500 allowed" in ended.text
+    assert "501 MB resident, limit 500" in ended.text
     assert 5 <= ended.seconds <= 7
 
 
