@@ -47,7 +47,7 @@ def pairs(bare: House, dressed: House, recipe: Recipe, n_views: int) -> Iterator
         recipe.judged_cameras,
         camera_seed(dressed.id, recipe),
         caster.item_counts,
-        caster.depth_pictures,
+        caster.item_pictures,
     ).views
     rows = [(v.id, v.room_id, v.score) for v in views]
     chosen = set(plan.spread(rows, n_views))

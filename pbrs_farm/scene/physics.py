@@ -126,7 +126,8 @@ def convex_parts_of(model: Model) -> tuple[F64, ...]:
         sys.stderr.write(f"convex parts of {model.id} ({len(triangles)} faces) ...\n")
     parts = convex_parts(triangles)
     data = io.BytesIO()
-    np.savez(data, **{f"{k:03}": part for k, part in enumerate(parts)})
+    named: dict[str, Any] = {f"{k:03}": part for k, part in enumerate(parts)}
+    np.savez(data, **named)
     with contextlib.suppress(OSError):  # without a cache the next process computes them again
         path.parent.mkdir(parents=True, exist_ok=True)
         write_whole(path, data.getvalue())

@@ -8,6 +8,7 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.geometry.convex_parts import convex_parts
 from pbrs_farm.scene import physics
 from tests.scene.homes import can, crate, small_home
 
@@ -37,8 +38,10 @@ def test_convex_parts_are_computed_once_for_all_processes(
 ) -> None:
     monkeypatch.setenv("PBRS_CACHE", str(tmp_path / "cache"))
     model, calls = crate(tmp_path), []
-    real = physics.convex_parts
-    monkeypatch.setattr(physics, "convex_parts", lambda t: calls.append(len(t)) or real(t))
+    real = convex_parts
+    monkeypatch.setattr(
+        "pbrs_farm.scene.physics.convex_parts", lambda t: calls.append(len(t)) or real(t)
+    )
     found = []
     for _ in range(3):
         physics.convex_parts_of.cache_clear()  # as in another process
