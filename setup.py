@@ -1,9 +1,9 @@
 """Builds sdist and wheel: equal trees give equal bytes, and each says what an installation needs.
 
 The folder `workers` is installed as `pbrs_farm_workers`, and its imports with it; a checkout keeps the
-folder's own name (an editable install maps nothing). The text for an index is README.md without what
-only a clone has. Both archives carry one time: SOURCE_DATE_EPOCH, else 1980. The rest stands in
-pyproject.toml.
+folder's own name (an editable install maps nothing). The text for an index is README.md without the
+parts that need a clone. Both archives have one date: SOURCE_DATE_EPOCH, else 1980. All other settings
+are in pyproject.toml.
 """
 
 from __future__ import annotations
@@ -69,7 +69,7 @@ class BuildPy(build_py):
 
 
 def unmask(folder: Path) -> None:
-    """Give what is in a folder the same rights everywhere: a machine's mask is no part of what is built."""
+    """Give all files of a folder the same permissions, so that a machine's umask does not change the archive."""
     for path in folder.rglob("*"):
         path.chmod(0o755 if path.is_dir() else 0o644)
 
