@@ -17,7 +17,7 @@ from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_mesh import json_of_glb
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.classes import NYU40_NAMES, WINDOW
 
 _STEP_M = 1.5  # maximum height of a sunken or raised floor over its level
 _UNIT = 1e-6  # tolerance of a normal's length
@@ -145,7 +145,7 @@ def _check_finish(
     alpha, mode = pbr["baseColorFactor"][3], material["alphaMode"]
     is_clear = row["kind"] in ("glass", "pane") or row["opacity"] < 1
     same = row["opacity"] >= 1 or abs(alpha - row["opacity"]) < 1e-6
-    expect((mode == "BLEND") == is_clear and same, "has the cutout of another")
+    expect((mode == "BLEND") == is_clear and same, "has another opacity in house.glb")
     cutoff = material.get("alphaCutoff", material["extras"].get("alphaCutoff", 0.5))
     same = (mode == "MASK" or "alphaCutoff" in material["extras"]) == bool(row["alpha_cutout"])
     same &= not row["alpha_cutout"] or abs(cutoff - row.get("alpha_cutoff", 0.5)) < 1e-6
@@ -188,6 +188,7 @@ def _check_openings(house: StoredHouse, tally: Tally) -> None:
     """Openings belong to doors and windows, and their normals are perpendicular to them."""
     ids = {row["id"]: row for row in house.items.values()}
     levels = {level["id"] for level in house.house["levels"]}
+    panes = {k for k, m in enumerate(house.house["materials"]) if m["kind"] in ("pane", "glass")}
     for row in house.house["openings"]:
         expect = tally.at("openings", f"{house.id} opening {row['id']}")
         item = ids.get(row["item_id"])
@@ -196,7 +197,10 @@ def _check_openings(house: StoredHouse, tally: Tally) -> None:
         expect(row["level_id"] in levels, "is on no level")
         if item is not None:
             # A glazed door may be recorded as a window.
-            same = row["is_window"] or item["kind"] != "window"
+            is_glazed = not panes.isdisjoint(s["material"] for s in item["surfaces"])
+            may_be_window = is_glazed or item["nyu40"] == WINDOW
+            is_window = item["kind"] == "window"
+            same = row["is_window"] == is_window or (row["is_window"] and may_be_window)
             expect(same, f"differs from its item, a {item['kind']}")
         quad, normal = np.array(row["quad"], np.float64), np.array(row["normal"], np.float64)
         sides = np.diff(quad, axis=0)

@@ -174,7 +174,10 @@ def _check_statistics(
     if name in _GRAIN_PX2:
         pair = chosen[:, 1:] & chosen[:, :-1]
         alike = float(np.corrcoef(error[:, 1:][pair], error[:, :-1][pair])[0, 1])
-        expect(alike >= _LEAST_ALIKE, f"neighbouring pixels share {alike:.2f}")
+        expect(
+            alike >= _LEAST_ALIKE,
+            f"has noise with a correlation of only {alike:.2f} between neighbours",
+        )
     fault = f"has {spread:.2f} times the expected noise"
     expect(_SPREAD[0] <= spread <= _SPREAD[1], fault)
 
