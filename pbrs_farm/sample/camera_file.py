@@ -95,6 +95,7 @@ class GivenCamera(BaseModel):
 
 # y up  <-  z up, the world of transforms.json without applied_transform.
 _Y_UP_FROM_Z_UP: Final = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+_LEAST_DETERMINANT: Final = 1e-12
 _LENSES: Final = ("PINHOLE", "SIMPLE_PINHOLE", "OPENCV")
 
 
@@ -133,6 +134,14 @@ class _Transforms(_Optics):
 
     frames: list[_Frame] = Field(min_length=1, max_length=MAX_CAMERAS)
     applied_transform: Annotated[tuple[Row, Row, Row], exactly(3, "rows")] | None = None
+
+    @model_validator(mode="after")
+    def _is_invertible(self) -> _Transforms:
+        if self.applied_transform is not None:
+            determinant = np.linalg.det(np.array(self.applied_transform)[:, :3])
+            if not np.abs(determinant) > _LEAST_DETERMINANT:
+                raise ValueError("applied_transform is flat: it has no inverse")
+        return self
 
     def cameras(self) -> list[dict[str, object]]:
         """Each frame as a GivenCamera, in the y-up world before applied_transform."""

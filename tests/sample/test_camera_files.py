@@ -162,5 +162,8 @@ def test_transforms_json_gives_the_cameras_before_its_transform() -> None:
             assert camera.intrinsics.fx == pytest.approx(160 / math.tan(0.45))
     with pytest.raises(BadInput, match="has a lens"):
         cameras_from_file_text(json.dumps(published | {"k1": 0.1}), "transforms.json", 320, 240)
+    flat = exported | {"applied_transform": [[0.0] * 4] * 3}
+    with pytest.raises(BadInput, match=r"transforms.json: .*applied_transform is flat"):
+        cameras_from_file_text(json.dumps(flat), "transforms.json", 320, 240)
     with pytest.raises(BadInput, match=r"frames\[0\].transform_matrix"):
         cameras_from_file_text('{"frames": [{}]}', "transforms.json", 320, 240)
