@@ -149,6 +149,8 @@ def _instances(gltf: Gltf, attributes: dict[str, Any], place: str) -> F64:
     moved = arrays.get("TRANSLATION", np.zeros((n, 3)))
     turned = arrays.get("ROTATION", np.tile([0.0, 0.0, 0.0, 1.0], (n, 1)))
     sizes = arrays.get("SCALE", np.ones((n, 3)))
+    if not (np.abs(np.linalg.norm(turned, axis=1) - 1) < 0.5).all():
+        raise BadHouse(gltf.file, f"{place}: ROTATION", "has a row that is not a unit quaternion")
     rows = [
         parent_from_node(gltf, {"translation": t, "rotation": r, "scale": s}, k)
         for k, (t, r, s) in enumerate(

@@ -106,7 +106,7 @@ def items_of_scene(
         if any(UNMAPPED in part.tags for part in parts):
             notes.add("unmapped-class", place, "matches no class; it is otherprop")
         if sum(part.n_faces for part in parts) < item.n_faces:
-            notes.add("outer-side", place, "its side seen from the room is left out")
+            notes.add("outer-side", place, "its outer side is left out")
         # Give each part a unique id: names in glTF may repeat.
         for part in parts:
             unique, k = part.id, 2

@@ -55,9 +55,9 @@ def read_obj_home(given: GivenFile, fields: ReadFields) -> House:
         hint = "a home has groups named floor, wall, sofa ...;"
         hint += f" `pbrs-farm objects {path} --out DIR` renders single models"
         raise BadHouse(
-            str(path), "", "is a model, no home: no groups named floor and wall", hint=hint
+            str(path), "", "is a model, not a home: no groups named floor and wall", hint=hint
         )
-    library = next((name for name in model.mtllibs), f"{path.stem}.mtl")
+    library = next(iter(model.mtllibs), f"{path.stem}.mtl")
     mtl = {m.name: m for m in reversed(read_mtl(folder, folder.name_from("", library)) or ())}
     walls = [m for name, ms in groups.items() if kinds[name] is ItemKind.WALL for m in ms]
     floors = [m for name, ms in groups.items() if kinds[name] is ItemKind.FLOOR for m in ms]

@@ -20,6 +20,7 @@ from pbrs_farm.read.gltf.document import UNREAD
 from pbrs_farm.read.gltf.node_joints import KEY, joint_row
 
 _AXES: Final = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
+_LEAST_DETERMINANT: Final = 0.1  # of a turn; of a mirrored, flattened or unknown frame it is less
 _UNLIMITED: Final = 1e6  # degrees or stage units; UsdPhysics writes infinity
 
 
@@ -28,8 +29,8 @@ def add_joints(
 ) -> None:
     """Write the joints of a stage to the extras of the nodes that they move.
 
-    nodes_of: the nodes of each prim's path. Joints without a range, and joints that neither turn about an
-    axis nor slide along one, are counted in a note.
+    nodes_of: the nodes of each prim's path. Joints without a range, joints that neither turn about an axis
+    nor slide along one, and joints of one mirrored or flattened body are counted in a note.
     """
     time = Usd.TimeCode.EarliestTime()
     cache = UsdGeom.XformCache(time)
@@ -49,11 +50,12 @@ def add_joints(
             nodes[number]["extras"][KEY] = row
         bodies[path] = carrier
     for path, carrier in bodies.items():
-        if carrier in bodies and carrier not in path:
+        if carrier in bodies and not path.startswith(f"{carrier}/"):
             _put_below(stage, path, carrier, nodes, nodes_of, cache)
     if n_unread:
         text = (
-            f"{n_unread} have no range, or neither turn about an axis nor slide; they are not read"
+            f"{n_unread} have no range, neither turn about an axis nor slide, or join a mirrored body;"
+            " they are not read"
         )
         notes.add(UNREAD, "joints", text)
 
@@ -68,7 +70,7 @@ def _moved_part(
     typed = (UsdPhysics.PrismaticJoint if is_slide else UsdPhysics.RevoluteJoint)(prim)
     low, high = typed.GetLowerLimitAttr().Get(time), typed.GetUpperLimitAttr().Get(time)
     axis = np.array(_AXES.get(str(typed.GetAxisAttr().Get(time)), _AXES["X"]))
-    if low is None or high is None or not max(abs(low), abs(high)) < _UNLIMITED:
+    if low is None or high is None or not (abs(low) < _UNLIMITED and abs(high) < _UNLIMITED):
         return None
     ends = [_end(stage, typed, number, cache, time) for number in (0, 1)]
     sign = 1.0
@@ -78,7 +80,10 @@ def _moved_part(
     if body is None:
         return None
     # Compare the joint's frame on both bodies.
-    turned = Rotation.from_matrix(world_from_0[:3, :3].T @ world_from_1[:3, :3])
+    between = world_from_0[:3, :3].T @ world_from_1[:3, :3]
+    if not np.linalg.det(between) > _LEAST_DETERMINANT:
+        return None
+    turned = Rotation.from_matrix(between)
     if is_slide:
         value = float((world_from_1[:3, 3] - world_from_0[:3, 3]) @ world_from_0[:3, :3] @ axis)
     else:
@@ -130,10 +135,12 @@ def _put_below(
     nodes_of: Mapping[str, Sequence[int]],
     cache: Any,
 ) -> None:
-    """Move the node of a body below that of the moving body which carries it."""
+    """Move the node of a body below that of the moving body which carries it, unless it holds that one."""
     if len(nodes_of.get(path, ())) != 1 or len(nodes_of.get(carrier, ())) != 1:
         return
     (number,), (above,) = nodes_of[path], nodes_of[carrier]
+    if above in _with_descendants(nodes, number):
+        return
     world, holder = (
         np.array(cache.GetLocalToWorldTransform(stage.GetPrimAtPath(p))).T for p in (path, carrier)
     )
@@ -144,3 +151,13 @@ def _put_below(
             node["children"].remove(number)
     nodes[above]["children"].append(number)
     nodes[number]["matrix"] = (np.linalg.inv(holder) @ world).T.ravel().tolist()
+
+
+def _with_descendants(nodes: Sequence[dict[str, Any]], number: int) -> set[int]:
+    """Numbers of a node and of all nodes below it."""
+    numbers, stack = {number}, [number]
+    while stack:
+        children = set(nodes[stack.pop()]["children"]) - numbers
+        numbers |= children
+        stack += children
+    return numbers

@@ -7,6 +7,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
+from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.house_bundle import bundle_from_house, house_from_bundle
@@ -180,3 +181,7 @@ def test_each_instance_of_a_node_is_an_item() -> None:
     )
     np.testing.assert_allclose([np.ptp(i.bounds[:, 1]) for i in chairs], [0.5, 1.0, 0.5])
     assert not house.notes
+    # The fault is of the instanced node, not of the node with the number of the instance.
+    attributes["ROTATION"] = s.writer.add_vertices(np.zeros((3, 4), np.float32))
+    with pytest.raises(BadHouse, match=rf"nodes\[{chair}\]: ROTATION: .*unit quaternion"):
+        read(s)

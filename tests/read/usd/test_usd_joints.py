@@ -97,9 +97,9 @@ def test_a_handle_on_a_door_moves_with_the_door(tmp_path: Path) -> None:
         tmp_path,
         body("body", (0, 0, 50)),
         body("door", (40, 0, 50)),
-        body("handle", (60, 0, 50), size=2),
+        body("door_handle", (60, 0, 50), size=2),
         joint("Revolute", "hinge", "body", "door", limits),
-        joint("Revolute", "turn", "door", "handle", limits),
+        joint("Revolute", "turn", "door", "door_handle", limits),
     )
     assert [j.part for j in item.joints] == ["door"]
     of_door = np.vstack([s.positions for s in item.surfaces if s.part == "door"])
@@ -119,3 +119,33 @@ def test_joints_without_a_range_are_counted_in_a_note(tmp_path: Path) -> None:
     assert not item.joints
     (note,) = notes
     assert note.startswith("2 have no range")
+
+
+LIMITS = "float physics:lowerLimit = 0\nfloat physics:upperLimit = 60"
+
+
+def test_joints_of_a_mirrored_body_are_counted_in_a_note(tmp_path: Path) -> None:
+    item, notes = cabinet(
+        tmp_path,
+        body("body", (0, 0, 50)),
+        body("door", (40, 0, 50), scale=-1),
+        body("flat", (60, 0, 50), scale=0),
+        joint("Revolute", "hinge", "body", "door", LIMITS),
+        joint("Revolute", "other", "body", "flat", LIMITS),
+    )
+    assert not item.joints
+    (note,) = notes
+    assert note.startswith("2 have no range")
+    assert "mirrored" in note
+
+
+def test_bodies_that_carry_each_other_stay_in_the_home(tmp_path: Path) -> None:
+    item, _notes = cabinet(
+        tmp_path,
+        body("left", (0, 0, 50)),
+        body("right", (60, 0, 50)),
+        joint("Revolute", "hinge", "left", "right", LIMITS),
+        joint("Revolute", "back", "right", "left", LIMITS),
+    )
+    assert np.ptp(item.bounds[:, 0]) == pytest.approx(0.8, abs=1e-6)
+    assert item.joints
