@@ -36,12 +36,12 @@ def _lines_of_structure(report: RepairReport) -> Iterator[str]:
         yield f"{_n(len(living), 'person or plant', 'persons and plants')} taken out."
     gone = [r.item_id for r in report.removed if r.reason not in ("person", "plant")]
     if gone:
-        yield f"{_n(len(gone), 'wall')} were inside others or in an opening, and removed: {_some(gone)}."
+        yield f"{_n(len(gone), 'wall')} removed, inside others or in an opening: {_some(gone)}."
     faces = report.faces
     if faces.n_degenerate_dropped:
         yield f"{_n(faces.n_degenerate_dropped, 'face')} without area dropped."
     if faces.n_turned:
-        yield f"{_n(faces.n_turned, 'face')} faced against their normals and were turned."
+        yield f"{_n(faces.n_turned, 'face')} turned to agree with their normals."
     if report.mirrors:
         yield f"{_n(len(report.mirrors), 'mirror')} without a mirror's surface got one."
     s = report.structure
@@ -86,14 +86,13 @@ def _lines_of_lamps(report: RepairReport) -> Iterator[str]:
         yield f"{_n(len(added), 'lamp')} had no emitter and got a bulb{more}."
     shaded = sorted({s.item_id for s in report.sources if s.shades})
     if shaded:
-        yield f"{_n(len(shaded), 'lamp')} were closed; the enclosing surface became a shade: {_some(shaded)}."
+        yield f"{_n(len(shaded), 'closed lamp')} got a shade from the enclosing surface: {_some(shaded)}."
     if report.fallback_lights:
         yield f"{_n(len(report.fallback_lights), 'room')} had neither lamp nor window and got a ceiling light: {_some(report.fallback_lights)}."
     if report.added_lamps:
         yield f"{_n(len(report.added_lamps), 'room')} where people live had no lamp, or a weak one, and got a ceiling light: {_some(report.added_lamps)}."
-
     if report.brightened_lamps:
-        yield f"{_n(len(report.brightened_lamps), 'room')} had weak ceiling lamps, which were made brighter: {_some(report.brightened_lamps)}."
+        yield f"{_n(len(report.brightened_lamps), 'room')} had weak ceiling lamps, now brighter: {_some(report.brightened_lamps)}."
 
 
 def _lines_of_rooms(report: RepairReport) -> Iterator[str]:
@@ -140,7 +139,7 @@ def _lines_of_furniture(report: RepairReport) -> Iterator[str]:
         yield f"{_n(len(f.floating), 'piece')} touch nothing: {_some([p.item_id for p in f.floating])}."
     if f.duplicates:
         pairs = [f"{a} and {b}" for a, b in f.duplicates]
-        yield f"{_n(len(pairs), 'piece')} are duplicates in one place: {_some(pairs)}."
+        yield f"{_n(len(pairs), 'duplicate')} in one place: {_some(pairs)}."
 
 
 def _n(count: int, one: str, many: str = "") -> str:
