@@ -52,7 +52,8 @@ def verify(
     folders = [p for name in keys.FOLDERS for p in (folder / name).glob("*") if p.is_dir()]
     houses = sorted(folders, key=lambda p: p.name)
     if not houses:
-        raise BadInput(folder, "houses/", "no houses here", hint="give an output folder")
+        text = "no houses here" if folder.is_dir() else "no such folder"
+        raise BadInput(folder, "", text, hint="give the folder of `run --out`")
     tally, views, n_halved = Tally(), list[StoredView](), 0
     # None is every pixel.
     n_pixels = None if all_pixels else (SAMPLE if sample is None else sample)

@@ -86,8 +86,8 @@ def echo_notes(notes: Counter[str], out: str) -> None:
         )
 
 
-def dress_seeds(text: str | None) -> tuple[int, ...]:
-    """The distinct seeds of --dress in the order given; empty without the option.
+def dress_seeds(text: str | None, option: str = "--dress") -> tuple[int, ...]:
+    """The distinct seeds of the option in the order given; empty without the option.
 
     text: 3, 1..20 or 1,4,7. Raises BadInput for anything else, and for more than MAX_SEEDS seeds.
     """
@@ -96,7 +96,7 @@ def dress_seeds(text: str | None) -> tuple[int, ...]:
     try:
         return seeds_of(text, least=1, max_seeds=MAX_SEEDS)
     except ValueError as error:
-        raise BadInput("--dress", text, str(error), hint="3, 1..20 or 1,4,7") from None
+        raise BadInput(option, text, str(error), hint="3, 1..20 or 1,4,7") from None
 
 
 def at_least(name: str, value: float, least: int) -> None:
@@ -235,7 +235,7 @@ def store_of(url: str) -> Store:
     from pbrs_farm.store import store_from_url
 
     if "://" not in url and not Path(url).is_dir():
-        raise BadInput(url, "", "no such folder", hint="the folder of --out, or a store's URL")
+        raise BadInput(url, "", "no such folder", hint="give an output folder, or a store's URL")
     return store_from_url(url, settings_from_environment().store)
 
 

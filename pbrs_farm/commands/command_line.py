@@ -10,7 +10,7 @@ import csv
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final
+from typing import Any, Final, NoReturn
 
 from pbrs_farm.core.shown_text import did_you_mean, hint_of_choice
 
@@ -59,6 +59,10 @@ class Parser(argparse.ArgumentParser):
             near = hint_of_choice(str(value), [str(choice) for choice in action.choices])
             raise argparse.ArgumentError(action, f"invalid choice: {value!r} ({near})")
 
+    def error(self, message: str) -> NoReturn:
+        """Exit with one line, without the usage, which takes a screen for some verbs."""
+        self.exit(2, f"{self.prog}: error: {message} (see `{self.prog} --help`)\n")
+
     def format_help(self) -> str:
         """The help text: argparse's for a verb, the verbs in groups for the command."""
         actions = [a for a in self._actions if isinstance(a, argparse._SubParsersAction)]
@@ -90,7 +94,7 @@ def unknown_words(words: Sequence[str], parser: argparse.ArgumentParser) -> str:
     if not options:
         if "=" in words[0] and "--set" in parser._option_string_actions:
             return f"unexpected word {words[0]!r}: each field has its own --set, `--set {words[0]}`"
-        return f"unexpected word {words[0]!r}: name all of a kind in one place"
+        return f"unexpected word {words[0]!r}"
     name = options[0].partition("=")[0]
     offer = did_you_mean(name, parser._option_string_actions)
     return f"no such option {name}" + (f", {offer}" if offer else "")

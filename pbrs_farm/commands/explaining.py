@@ -134,7 +134,7 @@ def _dress(args: argparse.Namespace) -> int:
 
     at_least("--views", args.views, 0)
     need("mitsuba", "drjit", *(["moderngl"] if args.views else []))
-    seeds = dress_seeds(args.dress)
+    seeds = dress_seeds(args.dress, "--seed")
     if len(seeds) != 1:
         raise BadInput("--seed", args.dress, "expected one seed")
     recipe = recipe_of(args)

@@ -156,9 +156,11 @@ _VIEW: Final = re.compile(
 def folder_of_view(word: str, settings: StoreSettings, *, needs_light: bool) -> Iterator[Path]:
     """The folder of a view: the one that word names, or a copy of what relighting reads of a URL's.
 
-    needs_light: radiance.exr too. Raises BadInput where a URL names no view, or its store lacks one.
+    needs_light: radiance.exr too. Raises BadInput where word names no view, or its store lacks one.
     """
     if "://" not in word:
+        if not (Path(word) / "view.json").is_file():
+            raise BadInput(word, "view.json", "no such file", hint="OUT/houses/HOUSE/views/VIEW")
         yield Path(word)
         return
     match = _VIEW.fullmatch(word)

@@ -51,7 +51,7 @@ def zipped(path: Path, **entries: str) -> Path:
             "add --set light.integrator=path",
         ),
         (["run", "builtin", "--out", "/proc/nowhere"], "/proc/nowhere"),
-        (["verify", "{out}"], "no houses here"),
+        (["verify", "{out}"], "no such folder"),
         (["sheet", "{out}"], "{out}"),
         (["select", "{out}", "--reference", "x"], "no such folder"),
         (["relight", "{out}"], "no such file"),

@@ -51,12 +51,17 @@ def refusal(capsys: pytest.CaptureFixture[str], *words: str, code: int) -> str:
         (["cameras", "builtin", "--set", "light.sp=4"], "did you mean light.spp?", 1),
         (["run", "builtin", "--out", "x", "--modes", "mltol"], "did you mean mlt_ol?", 1),
         (["step", "develp", "builtin", "--out", "x"], "did you mean develop?", 1),
+        (["verify", "nowhere"], "nowhere: no such folder (give the folder of `run --out`)", 1),
+        (["relight", "nowhere"], "no such file (OUT/houses/HOUSE/views/VIEW)", 1),
+        (["dress", "builtin", "--out", "x", "--seed", "red"], "--seed: red: expected", 1),
     ],
 )
 def test_a_misspelling_is_answered_with_suggestions(
     words: list[str], says: str, code: int, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    assert says in refusal(capsys, *words, code=code)
+    error = refusal(capsys, *words, code=code)
+    assert says in error
+    assert error.count("\n") == 1
 
 
 @pytest.mark.parametrize("verb", ["run builtin --out x", "demo", "submit x"])
