@@ -237,7 +237,7 @@ def print_summary(summary: Summary, seconds: float, out: str, *, as_json: bool) 
         warn(f"{subject} failed; reproduce: {command}" if command else text)
     if summary.taken_out:
         kinds = " and ".join(counted(n, kind) for kind, n in sorted(summary.taken_out.items()))
-        echo(f"{kinds} taken out: `removed` in repair.json (repair.remove_persons, remove_plants)")
+        echo(f"{kinds} removed: see repair.json (repair.remove_persons, remove_plants)")
     echo_notes(summary.notes, out)
 
 

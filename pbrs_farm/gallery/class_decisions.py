@@ -72,7 +72,7 @@ def decisions_text(decisions: tuple[ClassDecision, ...]) -> str:
     # Otherprop is the class of items that match no other class.
     n_prop = sum(d.n_items for d in decisions if d.name == "otherprop")
     rules = ", ".join(f"{n} by {rule}" for rule, n in by_rule.most_common())
-    return "\n".join([*lines, "", f"{n_items} items: {rules}; {n_prop} are otherprop"])
+    return "\n".join([*lines, "", f"{n_items} items: {rules}; {n_prop} of class otherprop"])
 
 
 def _decision_cell(text: str) -> str:

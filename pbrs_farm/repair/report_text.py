@@ -33,7 +33,7 @@ def summary_of_report(report: RepairReport) -> str:
 def _lines_of_structure(report: RepairReport) -> Iterator[str]:
     living = [r for r in report.removed if r.reason in ("person", "plant")]
     if living:
-        yield f"{_n(len(living), 'person or plant', 'persons and plants')} taken out."
+        yield f"{_n(len(living), 'person or plant', 'persons and plants')} removed."
     gone = [r.item_id for r in report.removed if r.reason not in ("person", "plant")]
     if gone:
         yield f"{_n(len(gone), 'wall')} removed, inside others or in an opening: {_some(gone)}."

@@ -77,7 +77,7 @@ def test_leaks_without_rays_are_unmeasured_rather_than_zero() -> None:
 
 def test_the_summary_lists_the_faults(repaired: tuple[House, RepairReport]) -> None:
     text = summary_of_report(repaired[1])
-    assert "1 person or plant taken out." in text
+    assert "1 person or plant removed." in text
     assert "2 floors and 2 ceilings had no thickness" in text
     assert "1 lamp had no emitter and got a bulb." in text
     assert "none reached the sky; 100 % of the floor area is in closed rooms" in text

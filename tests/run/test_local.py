@@ -150,7 +150,7 @@ def test_leaks_notes_and_lost_walls_are_reported_also_by_a_later_run(
         assert "LIGHT LEAKS IN: 833 of 20000 rays" in output.err
         assert "WALL LOST: w3: repair left 0.5 of 24.0 m2 of it" in output.err
         assert "2 views: 1 wall LOST, " in output.out
-        assert "1 person and 2 plants taken out: " in output.out
+        assert "1 person and 2 plants removed: " in output.out
         assert "4 notes (3 missing-texture, 1 wall-lost): `notes` in" in output.out.splitlines()[-1]
 
 
