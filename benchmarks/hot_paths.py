@@ -63,7 +63,7 @@ def make_items() -> Callable[[], object]:
     import pbrs_farm as pf
 
     names = ("bed", "bookcase", "desk", "chair", "sofa", "wardrobe")
-    return lambda: [pf.thing(name, seed=3) for name in names]
+    return lambda: [pf.generate_model(name, seed=3) for name in names]
 
 
 def read_plan() -> Callable[[], object]:
@@ -79,15 +79,11 @@ def read_plan() -> Callable[[], object]:
     return lambda: read_house(source, ReadFields())
 
 
-def sample_views() -> Callable[[], object]:
-    """Sample the cameras of the built-in home on a coarse grid."""
-    from pbrs_farm.core.recipe import recipe_from_name
-    from pbrs_farm.sample.house_sampler import sample_cameras
-
-    coarse = {"cell_m": 1.5, "score_width_px": 40, "score_height_px": 30}
-    house, fields = _house(), recipe_from_name("preview").cameras.model_copy(update=coarse)
-    caster = _caster(house)
-    return lambda: sample_cameras(house, fields, 0, caster.item_counts, caster.item_pictures)
+def count_items() -> Callable[[], object]:
+    """Count the pixels of each item in small pictures, as the search for cameras does."""
+    house = _house()
+    caster, cameras = _caster(house), [_camera(house).with_size(40, 30)] * 4
+    return lambda: caster.item_counts(cameras)
 
 
 def cast_labels() -> Callable[[], object]:
@@ -148,7 +144,7 @@ def match_edges() -> Callable[[], object]:
 PATHS: Final = {
     path.__name__: path
     for path in (
-        read_glb, read_plan, repair_home, make_items, sample_views, cast_labels, trace_light,
+        read_glb, read_plan, repair_home, make_items, count_items, cast_labels, trace_light,
         develop_picture, encode_layers, match_edges,
     )
 }  # fmt: skip

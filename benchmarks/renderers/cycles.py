@@ -195,6 +195,8 @@ def cycles_runs(
         mean_s = float(np.mean([cpu_s[job["file"]] for job in some[_N_SETUP:]]))
         pictures = np.stack([_exr(FILES / job["file"]) @ LUMINANCE for job in some[_N_SETUP:]])
         samples_s = (mean_s - setup_s) * effort.spp / (effort.spp - 1)
+        if samples_s <= 0:
+            raise SystemExit(f"cycles: view {k}, {way}: samples take less time than the set-up")
         runs[k][way] = Run(pictures.astype(np.float64), samples_s)
     longs = []
     for k, camera in enumerate(cameras):
