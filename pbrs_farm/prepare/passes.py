@@ -18,7 +18,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import EMPTY, Catalogue
 from pbrs_farm.core.house import House
 from pbrs_farm.core.made_home import VERSION as GENERATE_VERSION
-from pbrs_farm.core.plugins import marks_in_digest
+from pbrs_farm.core.plugins import marks_in_digest, plugins
 from pbrs_farm.core.recipe import Recipe, groups_of_step
 from pbrs_farm.prepare.dress_catalogue import catalogue_of
 from pbrs_farm.prepare.formats import format_of_source
@@ -181,11 +181,16 @@ def _dress_depends(source: SourceRef, recipe: Recipe) -> list[object]:
     fields = recipe.dress.model_dump(
         mode="json", exclude={"seed", "catalogue", "furnish", "passes", "open_share", "float_share"}
     )
-    plugins = filter(None, recipe.dress.passes.split(":"))
-    catalogue, marks = catalogue_of(recipe.dress), marks_in_digest("passes", plugins)
+    names = filter(None, recipe.dress.passes.split(":"))
+    catalogue, marks = catalogue_of(recipe.dress), marks_in_digest("passes", names)
     if not catalogue.own:
         del fields["library_share"]
     return [dress_seed(source, recipe), fields, catalogue.digest, marks]
+
+
+def _repair_depends(_source: SourceRef, _recipe: Recipe) -> list[object]:
+    # Plugins may add ceiling lamps; without plugins the list is empty.
+    return [*marks_in_digest("furniture", plugins("furniture"))]
 
 
 def _read(work: Preparation) -> Preparation:
@@ -326,7 +331,7 @@ PASSES: Final = (
     Pass("furnish", GENERATE_VERSION + _FURNISH_VERSION, _furnish, _is_furnished, _furnish_depends),
     Pass("dress", 13, _dress, _is_dressed, _dress_depends),
     # Its version counts the generated ceiling lamps, too.
-    Pass("repair", 5, _repair, _is_home),
+    Pass("repair", 5, _repair, _is_home, _repair_depends),
     Pass("open", 2, _leave_open, _stands_open, _open_depends),
     Pass("float", 2, _float, _has_floating_things, _float_depends),
     Pass(

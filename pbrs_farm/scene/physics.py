@@ -120,7 +120,7 @@ def convex_parts_of(model: Model) -> tuple[F64, ...]:
     try:
         with np.load(path) as arrays:
             return tuple(arrays[key] for key in sorted(arrays.files))
-    except (OSError, ValueError, zipfile.BadZipFile):
+    except (OSError, EOFError, ValueError, zipfile.BadZipFile):
         pass  # not cached, or damaged
     if sys.stderr.isatty():
         sys.stderr.write(f"convex parts of {model.id} ({len(triangles)} faces) ...\n")

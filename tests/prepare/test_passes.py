@@ -186,3 +186,16 @@ def test_another_version_of_a_pass_renews_the_houses_that_use_it(
     of_before = step_depends(of_plugin, Recipe())
     monkeypatch.setattr("pbrs_farm.prepare.passes.PASSES", tuple(raised))
     assert step_depends(of_plugin, Recipe()) != of_before
+
+
+def test_plugins_of_furniture_name_repair_which_may_add_their_lamps(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    source = resolve("builtin")
+    before = step_depends(source, Recipe())
+    monkeypatch.setattr(
+        passes_module,
+        "marks_in_digest",
+        lambda group, _names: ["lamps of shop 1"] if group == "furniture" else [],
+    )
+    assert step_depends(source, Recipe()) != before
