@@ -179,7 +179,7 @@ def _write_blind_scores(questions: Sequence[Question], out: Path) -> list[str]:
             for kind, (n, constant, words) in scores.items()
         )
     return [
-        f"{kind}: {n} questions; without the picture, the best constant answer scores {constant:.2f}"
+        f"{kind}: {n} question{'s' * (n != 1)}; without the picture, the best constant answer scores {constant:.2f}"
         f" and the usual answer to the same words {words:.2f}"
         for kind, (n, constant, words) in scores.items()
     ]
