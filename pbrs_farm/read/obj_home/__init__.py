@@ -28,7 +28,7 @@ FORMAT = Format(
     brings="what its groups are named", where="any modeller exports it", licence="of each home",
     suffixes=(".obj",), shared_suffixes=frozenset({".obj"}), beside=("*.mtl",),
     # a floor and a wall among its groups; other files are single models
-    contains=re.compile(rb"\A(?=[\s\S]*\n[go] [^\n]*floor)(?=[\s\S]*\n[go] [^\n]*wall)", re.IGNORECASE),
+    contains=re.compile(rb"\A(?=[\s\S]*^[go] .*floor)(?=[\s\S]*^[go] .*wall)", re.IGNORECASE | re.MULTILINE),
     read=_read_obj, companions=_companions_of_obj,
 )
 # fmt: on

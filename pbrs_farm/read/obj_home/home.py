@@ -33,8 +33,8 @@ from pbrs_farm.regular_files import MAX_SCENE_BYTES
 
 _UNITS: Final = {"m": 1.0, "cm": 0.01, "in": 0.0254, "ft": 0.3048, "mm": 0.001}
 _UNIT_COMMENT: Final = re.compile(rb"^#.*units?\s*[=:]\s*(\w+)", re.MULTILINE | re.IGNORECASE)
-_WORDS: Final = {"meters": "m", "metres": "m", "centimeters": "cm", "millimeters": "mm",
-                 "inches": "in", "feet": "ft"}  # fmt: skip
+_WORDS: Final = {"meter": "m", "metre": "m", "centimeter": "cm", "centimetre": "cm", "millimeter": "mm",
+                 "millimetre": "mm", "inch": "in", "inche": "in", "foot": "ft", "feet": "ft"}  # fmt: skip
 _USUAL_WALL_M: Final = 2.6  # height
 _FILLERS: Final = re.compile(r"\b(mesh|group|model|component|default|obj|object)(_?\d+)?\b", re.I)
 
@@ -104,7 +104,7 @@ def _world_from_file(data: bytes, walls: list[Mesh], floors: list[Mesh]) -> tupl
     height = max(max(float(np.ptp(m.positions, axis=0)[up]) for m in walls), 1e-9)
     comment = _UNIT_COMMENT.search(data[:4096])
     word = comment[1].decode("ascii", "replace").lower() if comment else ""
-    unit, guess = _WORDS.get(word, word), ""
+    unit, guess = _WORDS.get(word.removesuffix("s"), word), ""
     if unit not in _UNITS:
         unit = min(_UNITS, key=lambda u: abs(math.log(height * _UNITS[u] / _USUAL_WALL_M)))
         guess = f"states no unit; walls {height:.3g} high are read in {unit}"

@@ -23,7 +23,13 @@ def house(path: Path) -> House:
 
 @pytest.mark.parametrize(
     ("per_metre", "is_z_up", "comment"),
-    [(1, False, ""), (100, False, ""), (39.37, True, "File units = inches"), (1000, True, "")],
+    [
+        (1, False, ""),
+        (100, False, ""),
+        (39.37, True, "File units = inches"),
+        (1000, True, ""),
+        (100, False, "Units: centimetre"),
+    ],
 )
 def test_groups_are_items_in_metres_with_y_up(
     tmp_path: Path, per_metre: float, is_z_up: bool, comment: str
@@ -41,6 +47,12 @@ def test_groups_are_items_in_metres_with_y_up(
     (cloth,) = [m for m in home.materials if m.name == "linen"]
     assert cloth.texture_id is not None
     assert [n.kind for n in home.notes] == ([] if comment else ["assumed-unit"])
+
+
+def test_a_home_may_begin_with_a_group(tmp_path: Path) -> None:
+    path = tmp_path / "home.obj"
+    path.write_text("g floor\nv 0 0 0\nv 1 0 0\nv 0 0 1\nf 1 2 3\ng wall\nf 1 2 3\n")
+    assert resolve(str(path)).kind == "obj-home"
 
 
 def test_a_changed_picture_or_library_changes_the_source(tmp_path: Path) -> None:
