@@ -136,7 +136,7 @@ def _dress(args: argparse.Namespace) -> int:
     need("mitsuba", "drjit", *(["moderngl"] if args.views else []))
     seeds = dress_seeds(args.dress, "--seed")
     if len(seeds) != 1:
-        raise BadInput("--seed", args.dress, "expected one seed")
+        raise BadInput("--seed", args.dress, "expected one seed, such as 3")
     recipe = recipe_of(args)
     (source,) = variants(resolve(args.home, models=args.models), seeds)
     with share_bar("dress") as tell:
