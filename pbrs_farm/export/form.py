@@ -60,7 +60,8 @@ class ViewForm:
     """A form of finished views, written by `pbrs-farm export --to NAME`.
 
     A module `forms/<name>.py` ends with one, its dashes written `_`; a plugin's entry point names
-    one. Nothing else lists forms: the choices of --to, messages and docs/formats/export.md read the table.
+    one. The choices of --to, messages and docs/formats/export.md read the table; `READ_BACK` of
+    benchmarks/sets.py names the test that reads the form back.
 
         FORM = ViewForm("words", write_words, "`words.tsv`: a line of words a view", options=WordOptions)
 
