@@ -44,6 +44,7 @@ _MOST_COINCIDENT = (
 _PARALLEL = 0.999  # least cosine between the normals of coincident surfaces
 # Distances of neighbouring rays from the pixel's centre: a silhouette may be nearer than a thin item is wide.
 _JITTER_PX = (0.02, 0.005, 0.002)
+_MOST_GRAZED = 200  # pixels that graze an outline; more are wrong
 _JITTER = np.concatenate(
     [
         r * np.array([[1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [1, -1], [-1, 1], [-1, -1]])
@@ -130,11 +131,13 @@ def judge_pixels(view: StoredView, labels: Labels, pixels: Pixels, scene: Scene)
     # Try other triangles where the first triangle does not explain every label.
     open_ = np.nonzero(~np.logical_and.reduce(list(right.values())))[0]
     open_labels = {name: array[open_] for name, array in labels.items()}
-    candidates = [
-        rays.first(origin, view.rays(rows[open_] + dy, columns[open_] + dx)[1])
-        for dx, dy in _JITTER
-    ]
+    beside = [view.rays(rows[open_] + dy, columns[open_] + dx)[1] for dx, dy in _JITTER]
+    candidates = [rays.first(origin, ray) for ray in beside]
     candidates.append(_coincident(open_labels, face[open_], origin, directions[open_], scene))
+    if len(open_) <= _MOST_GRAZED:
+        # At the outline of an item its far side meets the near one: the ray may graze either.
+        grazed = zip(candidates[: len(beside)], beside, strict=True)
+        candidates += [_coincident(open_labels, c, origin, ray, scene) for c, ray in grazed]
     # Take a candidate that leaves fewer labels wrong.
     best = np.sum([~right[name][open_] for name in right], axis=0)
     for candidate in candidates:

@@ -22,7 +22,7 @@ from pbrs_farm.images import array_from_png, exr_from_layers, layers_from_exr, p
 from pbrs_farm.run.relight import linear_aovs
 from pbrs_farm.transport.develop.mode_pictures import develop
 from tests.check.roots import house_of, sign
-from tests.check.sorts_of_roots import rendered
+from tests.check.sorts_of_roots import sunlit
 
 Plant = Callable[[Path], None]
 
@@ -419,8 +419,7 @@ def of_another_hour(view: Path) -> None:
     """The light of the same view with the sun behind the house."""
     with tempfile.TemporaryDirectory() as name:
         root = Path(name) / "root"
-        words = {"sky.sun_elevation_deg": "30", "sky.sun_azimuth_deg": "165", "light.spp": "16"}
-        rendered("builtin", words, layers=())(root)
+        sunlit(165.0)(root)
         (file,) = root.glob(f"houses/*/views/{view.name}/radiance.exr")
         shutil.copy(file, view / "radiance.exr")
     develop_again(view)

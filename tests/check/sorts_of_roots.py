@@ -58,6 +58,19 @@ def _edited(root: Path) -> None:
         pf.render(home, look, layers=layers).save(root)
 
 
+def sunlit(azimuth_deg: float) -> Make:
+    """A floor on which the sun shines through a window at 345 degrees."""
+
+    def make(root: Path) -> None:
+        settings = {"light.spp": 16, "light.pilot_spp": 0, "light.denoise": False}
+        home = small_home().sun(elevation=30.0, azimuth=azimuth_deg).set(**settings)
+        eye, target = (1.90, 1.35, 3.21), (2.39, 0.91, 2.46)
+        look = pf.Camera.look_at(eye, target, size=(160, 120), hfov_deg=55.4)
+        pf.render(home, look).save(root)
+
+    return make
+
+
 def _opened(root: Path) -> None:
     """The door between the rooms ajar, with the parts that open."""
     home = small_home().open("door_inner", 0.6)
@@ -82,7 +95,7 @@ ROOTS: dict[str, Make] = {
     "pair": rendered("builtin", {"cameras.stereo_m": "0.065"}, n_views=2),
     "lamps": rendered("builtin", {"light.groups": "lamps", "light.spp": "16"}, layers=("residual_indoor",)),
     "cameras": rendered("builtin", {"light.denoise": "true", "light.spp": "16", "tone.variants": "3"}, layers=("residual",)),
-    "sun": rendered("builtin", {"sky.sun_elevation_deg": "30", "sky.sun_azimuth_deg": "345", "light.spp": "16"}, layers=()),
+    "sun": sunlit(345.0),
     "sensor": rendered("builtin", {"light.denoise": "true", "tone.camera": "drawn", "tone.variants": "2"}, layers=()),
     "dark": rendered("builtin", {"light.denoise": "true", "light.spp": "8", "sky.time": "night", "tone.camera": "webcam",
                                  "tone.variants": "1", "image.width_px": "216", "image.height_px": "162"}, n_views=2, layers=()),
