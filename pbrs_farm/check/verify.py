@@ -53,7 +53,7 @@ def verify(
     houses = sorted(folders, key=lambda p: p.name)
     if not houses:
         text = "no houses here" if folder.is_dir() else "no such folder"
-        raise BadInput(folder, "", text, hint="give the folder of `run --out`")
+        raise BadInput(folder, "", text, hint="give the output folder of a run")
     tally, views, n_halved = Tally(), list[StoredView](), 0
     # None is every pixel.
     n_pixels = None if all_pixels else (SAMPLE if sample is None else sample)

@@ -80,7 +80,7 @@ def views_of(root: Path) -> tuple[ViewEntry, ...]:
         text = (
             "not an output folder of pbrs-farm: it has no houses" if is_there else "no such folder"
         )
-        raise BadInput(root, "", text, hint="give the folder of `run --out`")
+        raise BadInput(root, "", text, hint="give the output folder of a run")
     folders = [folder for below in roots for folder in sorted(below.iterdir())]
     return tuple(view for folder in folders for view in _views(folder))
 

@@ -51,7 +51,7 @@ def refusal(capsys: pytest.CaptureFixture[str], *words: str, code: int) -> str:
         (["cameras", "builtin", "--set", "light.sp=4"], "did you mean light.spp?", 1),
         (["run", "builtin", "--out", "x", "--modes", "mltol"], "did you mean mlt_ol?", 1),
         (["step", "develp", "builtin", "--out", "x"], "did you mean develop?", 1),
-        (["verify", "nowhere"], "nowhere: no such folder (give the folder of `run --out`)", 1),
+        (["verify", "nowhere"], "nowhere: no such folder (give the output folder of a run)", 1),
         (["relight", "nowhere"], "no such file (OUT/houses/HOUSE/views/VIEW)", 1),
         (["dress", "builtin", "--out", "x", "--seed", "red"], "--seed: red: expected", 1),
     ],
