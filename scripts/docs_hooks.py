@@ -1,4 +1,4 @@
-"""What the site has besides its pages: the repository's own files (../NOTICE), notebooks, llms.txt.
+"""Parts of the site besides its pages: files of the repository (../NOTICE), notebooks, llms.txt.
 
 Effects: MkDocs'; writes llms.txt and the Markdown of each page into the site. A notebook becomes a page with a link
 to its file and the pictures of scripts/notebook_pictures.py; links to NAME.ipynb lead to the page.

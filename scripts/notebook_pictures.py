@@ -65,6 +65,7 @@ def picture_of(value: Any) -> Image.Image | None:
     if isinstance(value, Image.Image):
         return value
     html = value._repr_html_() if hasattr(value, "_repr_html_") else ""
+    html = html.replace(f"{Path.cwd()}/", "")  # the temporary folder means nothing to a reader
     if "<svg" not in html and "<img" not in html:
         return None
     from playwright.sync_api import sync_playwright

@@ -67,7 +67,7 @@ def _poses(world: Any, state: Any, names: Sequence[str]) -> F64:
 
 
 def _is_movable(pair: tuple[int, int], body_of: Mapping[int, int], stuck: Bools) -> bool:
-    """True if a loose body is in a pair, and none that is stuck."""
+    """True if a pair has a loose body and no stuck one."""
     loose = [body_of[body] for body in pair if body in body_of]
     return bool(loose) and not stuck[loose].any()
 

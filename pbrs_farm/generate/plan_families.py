@@ -36,7 +36,7 @@ class PlanFamily(Record):
     areas: dict[RoomType, float] = Field(default_factory=dict)  # by how much rooms are larger
     small_rooms: dict[RoomType, float] = Field(default_factory=dict)  # and more frequent
     dining_room: _Share = 0.2  # of homes with a bedroom to spare: the one nearest to the kitchen
-    office: _Share = 0.3  # the same: the smallest that is left
+    office: _Share = 0.3  # of the same homes: the smallest of the other bedrooms
     second_bathroom: _Share = 0.3  # of homes of three bedrooms; above .3 of two bedrooms, too
     hall_share: tuple[float, float] = (0.11, 0.16)  # of the area of all other rooms
 

@@ -42,7 +42,7 @@ def doorways(
     """A line across each door-sized gap between the end of a wall and the wall facing it.
 
     walls: their ground area as a shapely geometry, metres. reach_m: extension of each line into the
-    walls. doors: ground areas of doors, shut or open: a gap with one may be wider. A gap between two
+    walls. doors: ground areas of doors, shut or open; a gap that holds a door may be wider. A gap between two
     wall ends may be returned twice.
     """
     lines = []

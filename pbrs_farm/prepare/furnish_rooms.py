@@ -160,7 +160,7 @@ def _furnished(
 def _kinds_of_rooms(space: HouseSpace) -> dict[str, RoomKind]:
     """Room id -> use; rooms of unknown use get the uses that the home lacks, the largest room first.
 
-    A room without windows in a home with windows is a bathroom or a kitchen if the home has none, else a hall.
+    In a home with windows, a room without them becomes the bathroom or kitchen that the home lacks, else a hall.
     """
     kinds = {room.room.id: room.kind for room in space.rooms}
     has_windows = any(room.windows for room in space.rooms)

@@ -220,7 +220,7 @@ def test_a_view_is_named_by_the_url_of_its_store_too(
     assert out.read_bytes() == (view / "mlt_il_ol.png").read_bytes()
     assert main(["relight", view.as_uri(), "--list"]) == 0
     assert capsys.readouterr().out.splitlines()[1].startswith("lamp")
-    # A folder that is no view, and a missing view, are one line that names the URL.
+    # A folder without a view and a missing view each give one line that names the URL.
     for url in (view.parents[3].as_uri(), f"{view.as_uri()}_9"):
         assert main(["relight", url]) == 1
         assert url in capsys.readouterr().err

@@ -38,7 +38,7 @@ class MemoryLedger:
     beaten: list[list[str]] = field(
         default_factory=list
     )  # tasks whose leases each heartbeat renewed
-    reports: list[list[str]] = field(default_factory=list)  # tasks that were reported together
+    reports: list[list[str]] = field(default_factory=list)  # tasks of each report
     n_away: int = 0  # calls that fail before Redis answers again
     leader: str = ""
     reaped: int = 0

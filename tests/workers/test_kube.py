@@ -274,7 +274,7 @@ def _running(status: dict[str, Any], stage: str) -> int:
 
 
 def _check() -> None:
-    """Fail with a list of everything that is missing."""
+    """Fail with a list of all missing programs and settings."""
     if shutil.which("kubectl") is None:
         pytest.fail("make test-kube needs kubectl on the PATH", pytrace=False)
     nodes = _ran("get", "nodes", "-o", "name", "--request-timeout=10s")

@@ -76,7 +76,7 @@ _PROFILES: Final[dict[str, tuple[tuple[float, float], ...]]] = {
 }
 # fmt: on
 _MOUNTS: Final = ("none", "none", "mat", "mat", "double mat", "lip", "float")
-_RELIEF_M: Final = 0.006  # that a print lies below the front of its frame
+_RELIEF_M: Final = 0.006  # from the front of a frame back to its print
 
 
 def ring(

@@ -454,7 +454,7 @@ def built_in_cooker(m: Maker, size: Size, k: KitchenSet) -> None:
 
 @dataclass(frozen=True, slots=True)
 class Dishwasher:
-    """Parameters of a dishwasher; a built-in one has a front of its kitchen and no others."""
+    """Parameters of a dishwasher; if built in, it has the kitchen's front and ignores the rest."""
 
     built_in: bool
     front: Material

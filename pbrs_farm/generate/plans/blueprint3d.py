@@ -22,7 +22,7 @@ from pbrs_farm.generate.plans.usual_sizes import usual_size
 from pbrs_farm.home.names import words_of
 
 _CM: Final = 0.01
-_LARGEST_IN_METRES: Final = 100.0  # maximum extent of corners that are in metres
+_LARGEST_IN_METRES: Final = 100.0  # corners with a larger extent are in centimetres
 _IN_WALL: Final = frozenset({3, 7})  # types of items that cut their wall
 _MOST: Final = 5_000
 

@@ -46,7 +46,7 @@ def holes_with_names(
 ) -> list[Hole]:
     """Every hole once, with its kind, style and hinge; hole meshes without a gap have one, too.
 
-    A door or window of the furniture that is in no hole is a note.
+    A door or window of the furniture outside every hole becomes a note.
     """
     named = _openings_by_name(house)[:_MAX_NAMED]
     results = []

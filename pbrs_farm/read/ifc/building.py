@@ -498,7 +498,7 @@ def _is_nothing(product: Any) -> bool:
 
 
 def _wholes_of_parts(model: Any, metres: float) -> list[tuple[Any, Whole]]:
-    """Doors and windows without a shape that are put together from bars and plates."""
+    """Doors and windows without a shape: each is assembled from bars and plates."""
     from ifcopenshell.util.placement import get_local_placement
 
     wholes = []

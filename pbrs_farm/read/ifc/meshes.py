@@ -93,7 +93,7 @@ def meshes_of_products(
 
 
 class Whole(NamedTuple):
-    """A product without a shape that is made of others."""
+    """A product without a shape, assembled from other products."""
 
     world_from_product: F64  # (4, 4), z up, metres
     parts: tuple[int, ...]  # numbers of their rows

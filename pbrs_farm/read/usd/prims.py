@@ -191,7 +191,7 @@ class StageNodes:
             return False
         if named_kind(prim.GetName()) is not None or str(prim.GetPath()) in self._holders:
             return True
-        # Three chairs of a Chair_grp are items of their own.
+        # The three chairs of a Chair_grp are three items.
         is_model_group = Usd.ModelAPI(prim).GetKind() == Kind.Tokens.group
         names = [child.GetName() for child in _children(prim)] if is_model_group else []
         return own_class is not None and own_class in map(class_of_node_name, names)

@@ -113,7 +113,7 @@ def _parts(stage: Any, file: str) -> Iterator[_Part]:
 
 
 def _part(path: str, corners: F64, matrix: F64) -> _Part | None:
-    """The shape with unit axes, x along it; None for a shape that is flattened or not finite."""
+    """The shape with unit axes, x along it; None for a flattened shape or one that is not finite."""
     rows = matrix[:3, :3]
     lengths = np.linalg.norm(rows, axis=1)
     if not np.isfinite(matrix).all() or not (lengths > 1e-9).all():
@@ -161,7 +161,7 @@ def _inner_box(part: _Part) -> tuple[F64, F64]:
 
 
 def _passages(wall: _Part, in_walls: list[_Part]) -> Iterator[dict[str, Any]]:
-    """Holes down to the floor in a wall's mesh, without a door, window or opening of their own."""
+    """Holes down to the floor in a wall's mesh that no door, window or opening fills."""
     low, high = _inner_box(wall)
     filled = shapely.union_all(_areas(wall.corners[:, :, :2]))
     boxes = []

@@ -245,8 +245,8 @@ def _mirrored_ray(
     beta = path.beta * (reflectance / chance)
     o = offset_ray_origin(si.p, si.ng)
     is_followed = (u < chance) & (dr.dot(d, si.ng) > 0)
-    # A reflection that is followed by chance has no part in the guides: the denoiser takes them as
-    # free of noise.
+    # The guides leave out reflections that are followed by chance: the denoiser expects guides
+    # without noise.
     share = dr.select(chance < 1, 0, share)
     return MirroredRay(active & vertex.splits, is_followed, o, d, beta, share)
 

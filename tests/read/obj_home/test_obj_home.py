@@ -1,4 +1,4 @@
-"""Homes as OBJ: groups, units, the up axis, and single models that are no homes."""
+"""Homes as OBJ: groups, units, the up axis, and single models, which are not homes."""
 
 from __future__ import annotations
 
