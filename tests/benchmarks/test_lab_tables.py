@@ -7,6 +7,7 @@ import re
 from importlib import import_module
 from importlib.util import find_spec
 from pathlib import Path
+from typing import Any
 
 import pytest
 
@@ -120,7 +121,16 @@ def test_each_simple_table_is_once_in_the_lab_book_with_its_rows() -> None:
             assert "*`python -m benchmarks" in body, name
 
 
-@pytest.mark.parametrize("row", [row for row in ROWS_OF_BOOK if row.bench], ids=lambda r: r.what)
+def _rows_of_benches() -> list[Any]:
+    """Each row of the book that a bench writes; the bench "study" imports torch, so its rows are the study's tests."""
+    return [
+        pytest.param(row, id=row.what, marks=[pytest.mark.study] * (row.bench == "study"))
+        for row in ROWS_OF_BOOK
+        if row.bench
+    ]
+
+
+@pytest.mark.parametrize("row", _rows_of_benches())
 def test_the_figures_of_a_row_are_some_that_its_bench_writes(row: LabRow) -> None:
     """Each is in the module's UNITS; without that table the name or its end is quoted in the module."""
     name = f"benchmarks.{BENCHES[row.bench].module}"
