@@ -54,7 +54,7 @@ def index_text(readme: str) -> str:
 
 
 class BuildPy(build_py):
-    """Copies the packages, then renames what they import."""
+    """Copies the packages, renames what they import, and adds the pages that `pbrs-farm help` shows."""
 
     def run(self) -> None:
         super().run()
@@ -65,6 +65,10 @@ class BuildPy(build_py):
         for path in Path(self.build_lib).rglob("*.py"):
             text = path.read_text(encoding="utf-8")
             path.write_text(renamed(text, modules), encoding="utf-8")
+        for page in (HERE / "docs").rglob("*.md"):
+            target = Path(self.build_lib, "pbrs_farm/pages", page.relative_to(HERE / "docs"))
+            target.parent.mkdir(parents=True, exist_ok=True)
+            target.write_bytes(page.read_bytes())
         unmask(Path(self.build_lib))
 
 

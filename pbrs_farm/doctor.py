@@ -26,7 +26,7 @@ from pbrs_farm.installation import (
     system_command,
 )
 
-State = Literal["ok", "degraded", "missing"]
+State = Literal["ok", "absent", "degraded", "missing"]
 PROBE_TIMEOUT_S: Final = 120
 GL: Final = "GL"
 """Name of the OpenGL part. Without it the two OpenGL modes are unavailable; path tracing works."""
@@ -53,7 +53,7 @@ class Finding:
     """Result of checking one part of the machine: state, details and remedy."""
 
     part: str
-    state: State  # degraded: the main job runs without it
+    state: State  # absent: optional; degraded: the main job runs without it, slower or with fewer files
     text: str
     remedy: str = ""
     needed: bool = False  # the main job cannot run without it
@@ -120,7 +120,7 @@ def optional_extras() -> Finding:
         exception = f" but study, which trains networks: {install_command('study')}"
         return Finding("extras", "ok", "all" + exception * (not is_installed("torch")))
     features = "; ".join(f"{name}: {GIVES[name]}" for name in missing)
-    return Finding("extras", "degraded", f"not installed: {features}", install_command(*missing))
+    return Finding("extras", "absent", f"not installed: {features}", install_command(*missing))
 
 
 def llvm() -> Finding:
@@ -137,8 +137,16 @@ def llvm() -> Finding:
 
 
 def renderer_variants() -> list[Finding]:
+    # A machine without a GPU is complete.
+    states: dict[str, State] = {"cuda_ad_rgb": "absent"}
     findings = [
-        probe(f"mitsuba {n}", check_variant, _variant_remedy(n), argument=n, state="degraded")
+        probe(
+            f"mitsuba {n}",
+            check_variant,
+            _variant_remedy(n),
+            argument=n,
+            state=states.get(n, "degraded"),
+        )
         for n in _VARIANTS
     ]
     # One working variant is enough; without any, rendering is impossible.
@@ -167,7 +175,7 @@ def redis(url: str) -> Finding:
     if server is not None:
         return Finding("redis", "ok", f"{server} (only the farm needs it)")
     remedy = system_command("redis")
-    return Finding("redis", "degraded", "no redis-server (only the farm needs it)", remedy)
+    return Finding("redis", "absent", "no redis-server (only the farm needs it)", remedy)
 
 
 def _store(url: str) -> Finding:

@@ -19,7 +19,7 @@ from pbrs_farm.core.errors import MachineFailed
 EXTRA_OF: Final = {
     "moderngl": "", "glcontext": "", "mitsuba": "", "drjit": "", "pyoidn": "", "obstore": "s3", "celery": "workers", "kombu": "workers",
     "redis": "workers", "prometheus_client": "workers", "h5py": "selection", "faiss": "selection",
-    "starlette": "board", "uvicorn": "board", "torch": "study", "av": "video", "pxr": "usd",
+    "starlette": "", "uvicorn": "", "torch": "study", "av": "video", "pxr": "usd",
     "ifcopenshell": "ifc", "DracoPy": "gltf", "opengl_basisu": "gltf", "mujoco": "physics", "coacd": "physics",
     "onnx": "study", "onnxscript": "study", "tensorboard": "tensorboard", "wandb": "wandb",
 }
@@ -30,7 +30,6 @@ GIVES: Final = {
     "llvm": "light and labels several times faster, where the system has no LLVM",
     "s3": "stores on S3",
     "workers": "a farm of many machines",
-    "board": "a run in a browser",
     "selection": "choosing views by photographs",
     "video": "films of walks",
     "physics": "models that fall and lie",

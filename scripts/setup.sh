@@ -7,7 +7,7 @@ cd "$(dirname "${BASH_SOURCE[0]}")/.."
 VENV=.venv
 STAMP=$VENV/.setup.stamp
 LOG=$VENV/setup.log
-EXTRAS=s3,workers,selection,board,video,physics,usd,ifc,gltf,dev
+EXTRAS=s3,workers,selection,video,physics,usd,ifc,gltf,dev
 
 has_lib() { PATH=$PATH:/sbin:/usr/sbin ldconfig -p 2>/dev/null | grep -q "$1"; }
 

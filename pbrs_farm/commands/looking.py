@@ -1,6 +1,6 @@
-"""Verbs that describe the program and the machine: doctor, inputs, skies, recipes, layers, completion.
+"""Verbs that describe the program and the machine: doctor, help, cache, inputs, skies, recipes, layers, completion.
 
-Effects: print; skies downloads.
+Effects: print; skies downloads, cache deletes.
 """
 
 from __future__ import annotations
@@ -8,26 +8,39 @@ from __future__ import annotations
 import argparse
 import json
 import os
+import re
 import shutil
 import sys
 from collections.abc import Sequence
+from contextlib import nullcontext
 from dataclasses import asdict
+from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pbrs_farm.commands.arguments import Verb, echo, echo_json
 from pbrs_farm.commands.completion_scripts import SHELLS, completion_script
+from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import RECIPE_NAMES, Recipe, recipe_from_name
+from pbrs_farm.core.shown_text import did_you_mean
 
 if TYPE_CHECKING:
     from pbrs_farm.doctor import Finding
 
 
 def add_verbs(verb: Verb) -> None:
-    """Add doctor, inputs, skies, recipes, layers and completion."""
+    """Add doctor, help, cache, inputs, skies, recipes, layers and completion."""
     p = verb("doctor", _doctor)
     p.add_argument("--json", action="store_true", help="print JSON")
     p.add_argument("--store", default=os.environ.get("PBRS_STORE", ""), help="store to check")
     p.add_argument("--redis", default=os.environ.get("PBRS_REDIS_URL", ""), help="Redis to check")
+    p = verb("help", _help)
+    p.add_argument(
+        "page", nargs="?", default="", help="a page, or a word to look for; default: list all pages"
+    )
+    p = verb("cache", _cache)
+    p.add_argument(
+        "--clear", nargs="*", metavar="NAME", help="delete these entries, or all without a name"
+    )
     p = verb("inputs", _inputs)
     p.add_argument("--json", action="store_true", help="print JSON")
     p = verb("skies", _skies)
@@ -49,8 +62,8 @@ def _doctor(args: argparse.Namespace) -> int:
         return 0 if fine else 1
     for f in findings:
         # One line per part, with a remedy if it is not ok.
-        mark = {"ok": "ok      ", "degraded": "degraded", "missing": "MISSING "}[f.state]
-        echo(f"{mark}  {f.part:<20} {f.text}")
+        mark = "MISSING" if f.state == "missing" else f.state
+        echo(f"{mark:<8}  {f.part:<20} {f.text}")
         if f.state != "ok" and f.remedy:
             echo(f"{'':<32}-> {f.remedy}")
         if f.gives:
@@ -69,6 +82,67 @@ def _verdict(findings: Sequence[Finding], *, is_fine: bool) -> str:
     if any(f.part == GL and f.state != "ok" for f in findings):
         return f"This machine can render by path tracing; pictures of OpenGL are skipped. See {GL} above."
     return "This machine can render."
+
+
+def _help(args: argparse.Namespace) -> int:
+    from rich.console import Console
+    from rich.markdown import Markdown
+
+    pages = _pages()
+    word = args.page.removesuffix(".md")
+    exact = [name for name in pages if word in (name, name.rpartition("/")[2])]
+    if exact:
+        console = Console()
+        with console.pager(styles=True) if console.is_terminal else nullcontext():
+            console.print(Markdown(pages[exact[0]]))
+        return 0
+    hits = {name: text.lower().count(word.lower()) for name, text in pages.items()}
+    names = [name for name in pages if hits[name]] if word else list(pages)
+    if not names:
+        raise BadInput("help", "", f"no page has {word!r}", hint=did_you_mean(word, pages))
+    for name in sorted(names, key=lambda name: -hits[name]) if word else names:
+        title = next((x for x in pages[name].splitlines() if x.startswith("# ")), "")
+        echo(f"{name:<24} {title.removeprefix('# ')}")
+    return 0
+
+
+def _pages() -> dict[str, str]:
+    """Name of a page of the manual, such as howto/walk -> its Markdown without the marks for tests.
+
+    Pages of api/ are left out: the site fills them from docstrings.
+    """
+    package = Path(__file__).parents[1]
+    folder = package / "pages" if (package / "pages").is_dir() else package.parent / "docs"
+    paths = [p for p in sorted(folder.rglob("*.md")) if p.parent.name != "api"]
+    texts = {p.relative_to(folder).with_suffix("").as_posix(): p.read_text("utf-8") for p in paths}
+    return {
+        name: re.sub(r"<!--.*?-->\n?", "", text, flags=re.DOTALL) for name, text in texts.items()
+    }
+
+
+def _cache(args: argparse.Namespace) -> None:
+    from pbrs_farm.assets.debian import cache_folder
+    from pbrs_farm.operating_system import kernel_cache
+
+    entries = {p.name: p for p in sorted(cache_folder().glob("*"))}
+    entries["kernels"] = kernel_cache()
+    unknown = next((name for name in args.clear or () if name not in entries), None)
+    if unknown is not None:
+        raise BadInput("--clear", "", f"no entry {unknown!r}", hint=did_you_mean(unknown, entries))
+    total = 0
+    for name, path in entries.items():
+        files = [p for p in path.rglob("*") if p.is_file()] if path.is_dir() else [path]
+        size = sum(p.stat().st_size for p in files if p.exists())
+        is_cleared = args.clear is not None and (name in args.clear or not args.clear)
+        if is_cleared:
+            shutil.rmtree(path, ignore_errors=True) if path.is_dir() else path.unlink(
+                missing_ok=True
+            )
+        total += size
+        echo(f"{size / 1e6:9.1f} MB  {name}{'  deleted' if is_cleared else ''}")
+    echo(
+        f"{total / 1e6:9.1f} MB  in {cache_folder()} and {kernel_cache()}; all is fetched or made again when needed"
+    )
 
 
 def _inputs(args: argparse.Namespace) -> None:

@@ -39,9 +39,6 @@ def add_verbs(verb: Verb) -> None:
 
 
 def _board(args: argparse.Namespace) -> None:
-    missing = [name for name in ("starlette", "uvicorn") if find_spec(name) is None]
-    if missing:
-        raise MachineFailed(f"board needs {' and '.join(missing)}", hint=install_command("board"))
     from pbrs_farm.board.board_state import new_board
     from pbrs_farm.board.options import BoardOptions
     from pbrs_farm.board.serve import bound_socket, default_cache, server_of

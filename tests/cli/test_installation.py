@@ -44,14 +44,14 @@ def test_the_contribution_of_every_extra_of_all_is_listed() -> None:
 
 
 def test_missing_extras_are_named_with_their_features(monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr(doctor, "missing_extras", lambda: ["board", "usd"])
+    monkeypatch.setattr(doctor, "missing_extras", lambda: ["video", "usd"])
     monkeypatch.setattr(doctor, "install_command", lambda *names: f"pip install {','.join(names)}")
     finding = doctor.optional_extras()
-    assert (finding.state, finding.remedy) == ("degraded", "pip install board,usd")
-    assert "board: a run in a browser; usd: homes from and to USD" in finding.text
+    assert (finding.state, finding.remedy) == ("absent", "pip install video,usd")
+    assert "video: films of walks; usd: homes from and to USD" in finding.text
     assert doctor.can_run([finding])
-    monkeypatch.setattr(installation, "is_installed", lambda name: name != "uvicorn")
-    assert installation.missing_extras() == ["board"]
+    monkeypatch.setattr(installation, "is_installed", lambda name: name != "av")
+    assert installation.missing_extras() == ["video"]
 
 
 @pytest.mark.parametrize(
@@ -93,7 +93,7 @@ def test_a_checkout_and_a_wheel_are_distinguished(
     assert checkout_folder() == REPO
     assert checkout_folder(tmp_path / "site-packages" / "pbrs_farm") is None
     monkeypatch.setattr(installation, "pip_command", lambda: "pip")
-    assert install_command("s3", "board") == f"pip install -e '{REPO}[s3,board]'"
+    assert install_command("s3", "video") == f"pip install -e '{REPO}[s3,video]'"
     monkeypatch.setattr(installation, "checkout_folder", lambda: None)
     assert install_command("s3") == "pip install 'pbrs-farm[s3]'"
     assert install_command() == "pip install --force-reinstall 'pbrs-farm'"

@@ -100,7 +100,7 @@ def test_missing_variants_llvm_or_redis_are_reported(monkeypatch):
     monkeypatch.setattr("pbrs_farm.raycast.variant.llvm_libraries", lambda: old)
     assert "only 15.0.6" in doctor.llvm().text
     monkeypatch.setattr("shutil.which", lambda _name: None)
-    assert doctor.redis("").state == "degraded"
+    assert doctor.redis("").state == "absent"
     monkeypatch.setattr(doctor, "PACKAGES", ("numpy", "no-such-package"))
     assert doctor.packages().text == "not installed: no-such-package"
 
@@ -378,3 +378,27 @@ def test_a_demo_without_a_network_names_the_missing_downloads_and_shows_the_buil
     # With --bare only the home is fetched.
     main(["demo", "--home", "builtin", "--bare", "--out", str(tmp_path / "out")])
     assert capsys.readouterr().err == ""
+
+
+def test_help_shows_a_page_or_lists_the_pages_that_have_a_word(capsys):
+    assert "Install, and uninstall" in printed(capsys, "help", "install")
+    listed = printed(capsys, "help", "uninstall").splitlines()
+    assert listed[0].split() == ["install", "Install,", "and", "uninstall"]
+    assert "howto/walk" in printed(capsys, "help")
+    assert "<!--" not in printed(capsys, "help", "howto/walk")
+    assert "no page has 'xyzzyx'" in printed(capsys, "help", "xyzzyx", code=1)
+
+
+def test_the_cache_is_listed_with_its_size_and_deleted_by_name(tmp_path, monkeypatch, capsys):
+    monkeypatch.setenv("PBRS_CACHE", str(tmp_path / "cache"))
+    monkeypatch.setattr("pbrs_farm.operating_system.kernel_cache", lambda: tmp_path / "kernels")
+    for name, size in {"painted/a.png": 2_000_000, "b.deb": 1_000_000}.items():
+        (tmp_path / "cache" / name).parent.mkdir(parents=True, exist_ok=True)
+        (tmp_path / "cache" / name).write_bytes(b"0" * size)
+    lines = printed(capsys, "cache").splitlines()
+    assert [line.split()[::2][:2] for line in lines[:2]] == [["1.0", "b.deb"], ["2.0", "painted"]]
+    assert "did you mean painted" in printed(capsys, "cache", "--clear", "painte", code=1)
+    printed(capsys, "cache", "--clear", "painted")
+    assert [p.name for p in (tmp_path / "cache").iterdir()] == ["b.deb"]
+    printed(capsys, "cache", "--clear")
+    assert not any((tmp_path / "cache").iterdir())
