@@ -10,13 +10,13 @@ import numpy as np
 from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.export.forms.yolo import numbered_objects, write_data_yaml, write_pictures_and_labels
-from pbrs_farm.export.masks import mask_polygons
+from pbrs_farm.export.masks import mask_polygon
 
 
 def write_yolo_seg(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     """As the form yolo; a line is a polygon: class, then x and y of each corner as shares.
 
-    Every connected part of an item's visible mask is a polygon, see mask_polygons.
+    An item has one line, whatever the number of its visible parts, see mask_polygon.
     """
     write_pictures_and_labels(views, out, _polygon_lines)
 
@@ -27,16 +27,16 @@ def _polygon_lines(view: ChosenView) -> Iterable[str]:
     for number, row in numbered_objects(view):
         # Crop to the box of the mask.
         x0, y0, x1, y1 = row["box2d"]
-        for ring in mask_polygons(instance[y0:y1, x0:x1] == row["id"]):
-            shares = (ring + np.array([x0, y0])) / np.array([width, height])
-            yield f"{number} " + " ".join(f"{x:.6f}" for x in shares.ravel()) + "\n"
+        ring = mask_polygon(instance[y0:y1, x0:x1] == row["id"])
+        shares = (ring + np.array([x0, y0])) / np.array([width, height])
+        yield f"{number} " + " ".join(f"{x:.6f}" for x in shares.ravel()) + "\n"
 
 
 FORM = ViewForm(
     "yolo-seg",
     write_yolo_seg,
-    "as `yolo`; a line has the polygon of a connected part of an item's mask, within"
-    " a pixel of the mask's outline; the polygon goes to each hole, around it and back",
+    "as `yolo`; a line has the polygon of an item's mask, with an IoU of 0.97 or more; it goes to"
+    " each hole and further part, around it and back, as Ultralytics joins polygons",
     has_classes=True,
     finish=write_data_yaml,
     convention=Convention(0.5, has_k=False, axes="shares of the picture, from its corner"),
