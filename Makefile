@@ -33,7 +33,7 @@ endef
 
 define study-packages
 $(BIN)/python -c "import torch" 2>/dev/null || $(BIN)/pip install -q --disable-pip-version-check --no-compile "torch==2.13.0"; \
-$(BIN)/pip install -q --disable-pip-version-check -e ".[study,study-peers]"
+$(BIN)/pip install -q --disable-pip-version-check deploy/weights -e ".[study,study-peers]"
 endef
 
 # bpy wants numpy below 2 and so a Python of its own.

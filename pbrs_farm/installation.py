@@ -19,7 +19,7 @@ from pbrs_farm.core.errors import MachineFailed
 EXTRA_OF: Final = {
     "moderngl": "", "glcontext": "", "mitsuba": "", "drjit": "", "pyoidn": "", "obstore": "s3", "celery": "workers", "kombu": "workers",
     "redis": "workers", "prometheus_client": "workers", "h5py": "selection", "faiss": "selection",
-    "starlette": "", "uvicorn": "", "torch": "study", "av": "video", "pxr": "usd",
+    "starlette": "", "uvicorn": "", "torch": "study", "pbrs_farm_weights": "study", "av": "video", "pxr": "usd",
     "ifcopenshell": "ifc", "DracoPy": "gltf", "opengl_basisu": "gltf", "mujoco": "physics", "coacd": "physics",
     "onnx": "study", "onnxscript": "study", "tensorboard": "tensorboard", "wandb": "wandb",
 }
@@ -89,7 +89,9 @@ def install_command(*extras: str) -> str:
     names = f"[{','.join(chosen)}]" if chosen else ""
     checkout = checkout_folder()
     if checkout is not None:
-        return f"{pip_command()} install -e '{checkout}{names}'"
+        # The weights are a package of the same checkout.
+        weights = f"'{checkout}/deploy/weights' " * ("study" in chosen)
+        return f"{pip_command()} install {weights}-e '{checkout}{names}'"
     return f"{pip_command()} install {'--force-reinstall ' * (not chosen)}'pbrs-farm{names}'"
 
 

@@ -34,13 +34,17 @@ _BEGIN, _END = "<!-- wheels: scripts/wheel_table.py -->\n", "<!-- end of wheels 
 def dependencies(pyproject: Mapping[str, object]) -> dict[str, list[str]]:
     """Requirements without markers, by extra; "" for those of every installation.
 
-    Extras for developers only are excluded.
+    Extras for developers only, and our own packages, are excluded.
     """
     project: dict = pyproject["project"]  # type: ignore[assignment, type-arg]
     groups = {"": project["dependencies"], **project["optional-dependencies"]}
     # An extra of a dependency does not matter: only the package is looked up.
     return {
-        extra: [re.sub(r"\[.*?\]|;.*", "", text).strip() for text in requirements]
+        extra: [
+            re.sub(r"\[.*?\]|;.*", "", text).strip()
+            for text in requirements
+            if not text.startswith("pbrs-farm-")  # our own, without compiled code
+        ]
         for extra, requirements in groups.items()
         if extra not in _OTHERS
     }

@@ -6,7 +6,7 @@
     python -m benchmarks.study.shipped install               the best seed of each task
 
 Every command resumes: finished homes and judged runs are skipped. Effects: out/study/shipped (or
-PBRS_STUDY_FOLDER/shipped); `install` writes pbrs_farm/study/weights.
+PBRS_STUDY_FOLDER/shipped); `install` writes deploy/weights.
 """
 
 from __future__ import annotations
@@ -137,7 +137,7 @@ def held_out_homes() -> list[str]:
 
 def install() -> None:
     """Pack the best seed of each task and copy it into the package."""
-    from pbrs_farm.study.judging.packed_weights import SHIPPED, pack_weights
+    from pbrs_farm.study.judging.packed_weights import pack_weights, weights_folder
 
     for task in TASKS:
         reports = sorted(RUNS.glob(f"{task}_seed*/evaluation/evaluation.json"))
@@ -146,7 +146,7 @@ def install() -> None:
             continue
         run = best_run(task, {path.parents[1]: json.loads(path.read_text()) for path in reports})
         packed = pack_weights(run, RUNS / "packed" / task, made_by=MADE_BY)
-        shutil.copytree(packed.root, SHIPPED / task, dirs_exist_ok=True)
+        shutil.copytree(packed.root, weights_folder() / task, dirs_exist_ok=True)
         print(f"{task}: {run.name} installed")
 
 

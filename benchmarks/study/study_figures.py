@@ -22,7 +22,7 @@ import pbrs_farm
 from benchmarks.figures import write_report
 from benchmarks.study.shipped import FOLDER
 from pbrs_farm.images import jpeg_from_array
-from pbrs_farm.study.judging.packed_weights import SHIPPED, shipped_run
+from pbrs_farm.study.judging.packed_weights import shipped_run, weights_folder
 from pbrs_farm.study.metrics.edge_scores import edge_counts
 from pbrs_farm.views.packing.pack_shards import pack
 from pbrs_farm.views.packing.packing_plan import Packing
@@ -108,7 +108,7 @@ def boundary_cpu_s() -> float:
 
 def weights_figures() -> dict[str, float]:
     """Size, judged error, speed and ONNX of the weights in the package."""
-    sizes = [path.stat().st_size / 1e6 for path in SHIPPED.glob("*/weights.safetensors")]
+    sizes = [path.stat().st_size / 1e6 for path in weights_folder().glob("*/weights.safetensors")]
     return {
         "study.weights_mb": round(max(sizes), 2),
         "study.weights_deg": _judged("normals")["mean_deg"],

@@ -19,9 +19,15 @@ from pathlib import Path
 from typing import Final
 
 REPO: Final = Path(__file__).parents[2]
+DEPLOY_PAGES: Final = sorted(
+    # The cards of the weights are written by the program that trained them.
+    p
+    for p in (REPO / "deploy").rglob("*.md")
+    if "pbrs_farm_weights" not in p.parts
+)
 PAGES: Final = (
     REPO / "README.md", REPO / "CONTRIBUTING.md", REPO / "ARCHITECTURE.md", *sorted((REPO / "docs").rglob("*.md")),
-    *sorted((REPO / "deploy").rglob("*.md")), *sorted((REPO / "examples").rglob("*.md")),
+    *DEPLOY_PAGES, *sorted((REPO / "examples").rglob("*.md")),
 )  # fmt: skip
 HOW: Final = ("run", "small", "excerpt")
 NEEDS: Final = {

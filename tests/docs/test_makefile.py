@@ -10,12 +10,13 @@ from pathlib import Path
 import pytest
 
 from benchmarks.__main__ import BENCHES
+from tests.docs.fenced import DEPLOY_PAGES
 
 REPO = Path(__file__).parents[2]
 MAKEFILE = (REPO / "Makefile").read_text(encoding="utf-8")
 TARGETS = re.findall(r"^([a-z][a-z0-9-]*):.*##", MAKEFILE, re.MULTILINE)
 PAGES = [
-    *sorted(REPO.glob("*.md")), *sorted((REPO / "docs").rglob("*.md")), *sorted((REPO / "deploy").rglob("*.md")),
+    *sorted(REPO.glob("*.md")), *sorted((REPO / "docs").rglob("*.md")), *DEPLOY_PAGES,
     REPO / "tests/infra/README.md",
 ]  # fmt: skip
 

@@ -14,7 +14,7 @@ from pathlib import Path
 import pytest
 
 from pbrs_farm.core.plugins import GROUPS
-from tests.docs.fenced import blocks_of
+from tests.docs.fenced import DEPLOY_PAGES, blocks_of
 
 REPO = Path(__file__).parents[2]
 CODE = ("pbrs_farm", "workers", "tests", "benchmarks", "scripts", "examples")
@@ -23,7 +23,7 @@ SOURCES = sorted(p for folder in CODE for p in (REPO / folder).rglob("*.py"))
 # writes.
 PAGES = [
     p
-    for p in (*REPO.glob("*.md"), *(REPO / "docs").rglob("*.md"), *(REPO / "deploy").rglob("*.md"))
+    for p in (*REPO.glob("*.md"), *(REPO / "docs").rglob("*.md"), *DEPLOY_PAGES)
     if "lab" not in p.parts and p.name != "CHANGELOG.md"
 ]
 # A file: folders and a name with an ending of the repository; a module: a dotted name.

@@ -19,7 +19,9 @@ def test_the_paths_that_notice_names_are_there() -> None:
 
 def test_the_page_of_licences_names_all_weights_and_all_that_is_vendored() -> None:
     text = (ROOT / "docs/licences.md").read_text(encoding="utf-8")
-    weights = [p.parent.name for p in (ROOT / "pbrs_farm/study/weights").glob("*/README.md")]
+    weights = [
+        p.parent.name for p in (ROOT / "deploy/weights/pbrs_farm_weights").glob("*/README.md")
+    ]
     vendored = [p.name for p in (ROOT / "pbrs_farm/board/vendor").glob("*.js")]
     named_by_notice = re.findall(
         r"^pbrs_farm/\S+/([\w-]+\.\w+)", (ROOT / "NOTICE").read_text(), re.M

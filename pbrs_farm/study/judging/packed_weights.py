@@ -1,7 +1,7 @@
 """A finished run packed for sharing: half floats, their sha256, a model card. Effects: files.
 
-A packed run is a run: `predict`, `evaluate` and `--init` take it. The best ones ship with the
-package, below study/weights.
+A packed run is a run: `predict`, `evaluate` and `--init` take it. The best ones are the
+package pbrs-farm-weights, which a checkout has in deploy/weights.
 """
 
 from __future__ import annotations
@@ -10,12 +10,14 @@ import hashlib
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
+from importlib.resources import files
 from pathlib import Path, PurePosixPath
 from typing import Any, Final
 
 import numpy as np
 
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.installation import checkout_folder, need
 from pbrs_farm.study.judging.evaluation import Trained, open_run, trained_columns
 from pbrs_farm.study.judging.figure_text import markdown, shown_figure, title_of
 from pbrs_farm.study.training.checkpoint import read_tensors, write_tensor_file
@@ -23,7 +25,6 @@ from pbrs_farm.study.training.run_folder import RunFolder, make_folder
 from pbrs_farm.study.training.view_sources import NYU_LIGHT, PHOTO_LIGHT
 from pbrs_farm.study.training_plan import plan_as_json
 
-SHIPPED: Final = Path(__file__).parents[1] / "weights"
 _TOLD_RAYS: Final = " and the direction of each pixel's ray (`predict --hfov`)"
 _PREDICTS: Final = {
     "normals": "the surface normal at each pixel",
@@ -34,11 +35,20 @@ _PREDICTS: Final = {
 _MOST_HOMES: Final = 12  # number of homes named on the card
 
 
+def weights_folder() -> Path:
+    """The folder of the shipped weights, with one folder a task; MachineFailed without their package."""
+    checkout = checkout_folder()
+    if checkout is not None:
+        return checkout / "deploy" / "weights" / "pbrs_farm_weights"
+    need("pbrs_farm_weights")
+    return Path(str(files("pbrs_farm_weights")))
+
+
 def shipped_run(task: str) -> Path:
-    """Folder of the package's own weights of a task; BadInput if there are none."""
-    folder = SHIPPED / task
+    """Folder of the shipped weights of a task; BadInput for a task without shipped weights."""
+    folder = weights_folder() / task
     if not (folder / "run.json").exists():
-        tasks = sorted(path.parent.name for path in SHIPPED.glob("*/run.json"))
+        tasks = sorted(path.parent.name for path in weights_folder().glob("*/run.json"))
         hint = f"shipped weights: {', '.join(tasks)}" if tasks else "pbrs-farm predict RUN PHOTO..."
         raise BadInput("--task", task, "the package has no weights for this task", hint=hint)
     return folder

@@ -213,9 +213,9 @@ def test_predict_without_a_photograph_explains_its_use(
 
 def test_shipped_weights_are_small_whole_and_have_a_card() -> None:
     from pbrs_farm.study.judging.evaluation import open_run
-    from pbrs_farm.study.judging.packed_weights import SHIPPED, shipped_run
+    from pbrs_farm.study.judging.packed_weights import shipped_run, weights_folder
 
-    tasks = sorted(path.parent.name for path in SHIPPED.glob("*/run.json"))
+    tasks = sorted(path.parent.name for path in weights_folder().glob("*/run.json"))
     assert tasks == ["boundaries", "normals", "segmentation"]
     for task in tasks:
         run = open_run(shipped_run(task))  # checks the sha256
