@@ -7,13 +7,20 @@ import re
 import sys
 from typing import Final
 
+from workers.ledger.redis_connections import RefusedForNow
+
 _SECRETS: Final = re.compile(r"(rediss?://[^:/@\s]*:)[^@\s]+@")
 
 
 class NoSecrets(logging.Formatter):
-    """Formats a record with the passwords of Redis URLs replaced by ***."""
+    """Formats a record with the passwords of Redis URLs replaced by ***.
+
+    A temporary refusal of Redis is one line: kombu adds its traceback to a message that says all.
+    """
 
     def format(self, record: logging.LogRecord) -> str:
+        if record.exc_info and isinstance(record.exc_info[1], RefusedForNow):
+            record.exc_info = None
         return _SECRETS.sub(r"\1***@", super().format(record))
 
 

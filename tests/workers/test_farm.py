@@ -17,6 +17,7 @@ from pbrs_farm.core.errors import BadInput
 from tests.inputs.farm_processes import renderers
 from tests.workers.small_farm import SmallFarm
 from workers.config import config_from_environment
+from workers.ledger.redis_connections import RefusedForNow
 from workers.logs import NoSecrets
 from workers.node.supervisor import command
 
@@ -95,6 +96,15 @@ def test_no_secret_is_on_a_command_line_or_in_a_log() -> None:
     assert "hu" not in " ".join(command(config)) + repr(config)
     record = logging.LogRecord("x", 20, "", 0, "to redis://farm:hush@h:1/0", (), None)
     assert "hush" not in NoSecrets("%(message)s").format(record)
+
+
+def test_a_temporary_refusal_of_redis_is_logged_without_a_traceback() -> None:
+    """As kombu logs it when Redis refuses the acknowledgement of a message."""
+    formatter = NoSecrets("%(message)s")
+    for error, is_shown in ((RefusedForNow("OOM", "OOM not now"), False), (ValueError("x"), True)):
+        info = (type(error), error, None)
+        record = logging.LogRecord("kombu", logging.CRITICAL, "", 0, "no ack", None, info)
+        assert (type(error).__name__ in formatter.format(record)) == is_shown
 
 
 @pytest.mark.parametrize(
