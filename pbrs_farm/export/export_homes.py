@@ -10,7 +10,7 @@ from typing import Any
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import House
-from pbrs_farm.export.form import HomeForm, form_names, form_of, options_from
+from pbrs_farm.export.form import REMARKS, HomeForm, form_names, form_of, options_from
 from pbrs_farm.export.grasps import GRASPS, grasps_json
 from pbrs_farm.export.home_pieces import ExportedHome, exported_home
 from pbrs_farm.formats.house_bundle import house_from_bundle
@@ -31,6 +31,9 @@ def export_homes(folder: Path, out: Path, name: str, **options: Any) -> tuple[in
         for house_folder in folders:
             home = exported_home(stored_house(house_folder), form_options)
             _write_home(home, scratch / home.house.id, form)
+            written = scratch / home.house.id / REMARKS
+            if written.is_file():
+                remarks += written.read_text("utf-8").splitlines()
             if form.remark:
                 remarks.append(f"{home.house.id}: {form.remark}")
         return len(folders), len(files_below(scratch)), remarks

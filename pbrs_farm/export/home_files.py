@@ -12,8 +12,11 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.export.form import REMARKS
+from pbrs_farm.export.home_pieces import ExportedHome
 from pbrs_farm.geometry.convex_parts import hull_faces
 
+_OPEN: Final = 1e-3  # radians or metres
 Z_UP: Final = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 """(3, 3): (x, y, z) with y up to (x, -z, y) with z up."""
 
@@ -54,6 +57,15 @@ def digest_name(data: bytes) -> str:
     16 hex digits: enough for the pieces of one export, no proof of equality.
     """
     return keys.sha256(data)[:16]
+
+
+def write_shut_remark(home: ExportedHome, folder: Path) -> None:
+    """Write a remark if parts of a home are open; for forms without a state of joints."""
+    joints = [body.joint for piece in home.pieces for body in piece.bodies if body.joint]
+    n_open = sum(abs(joint.value) > _OPEN for joint in joints)
+    if n_open:
+        text = f"{home.house.id}: {n_open} open doors and drawers are shut: the form has no state of joints\n"
+        (folder / REMARKS).write_text(text)
 
 
 def write_files(folder: Path, files: Mapping[str, bytes]) -> None:

@@ -326,7 +326,7 @@ def _edit(work: Preparation) -> Preparation:
 
 
 PASSES: Final = (
-    Pass("read", 12, _read, lambda _source, _recipe: True, _read_depends),
+    Pass("read", 13, _read, lambda _source, _recipe: True, _read_depends),
     Pass("stand-ins", 4, _stand_in, _has_stand_ins, _stand_ins_depend),
     Pass("furnish", GENERATE_VERSION + _FURNISH_VERSION, _furnish, _is_furnished, _furnish_depends),
     Pass("dress", 13, _dress, _is_dressed, _dress_depends),

@@ -243,7 +243,7 @@ class Home:
         """Write the home for another program: to = gltf, habitat, mjcf, sdf, urdf, usd or usdz.
 
         Each item is one node, prim or model with a collider and its lamps; docs/formats/simulators.md describes
-        the forms, and `pf.load` reads all but mjcf, sdf and urdf. options: of the form. Raises BadInput if the
+        the forms, and `pf.load` reads all of them. options: of the form. Raises BadInput if the
         folder is not empty, or for an option that the form does not have.
 
             >>> home.export("as_gltf").is_dir()

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.classes import NYU40_NAMES
-from pbrs_farm.core.house import House
+from pbrs_farm.core.house import House, Item
 from pbrs_farm.core.joints import JointKind
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.export.export_homes import export_house
@@ -19,7 +19,9 @@ from pbrs_farm.prepare.source import resolve
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.inputs.cupboards import cupboard
 
-FILES = {"usd": "*.usd*", "mjcf": "*.xml", "habitat": "*.scene_instance.json"}
+FILES = {"usd": "*.usd*", "mjcf": "*.xml", "habitat": "*.scene_instance.json",
+         "urdf": "*.urdf", "sdf": "*.sdf"}  # fmt: skip
+WITHOUT_STATE = ("urdf", "sdf")
 
 
 def half_open() -> House:
@@ -38,12 +40,23 @@ def half_open() -> House:
     return replace(home, items=tuple(items))
 
 
+def shut(item: Item) -> Item:
+    for joint in item.joints:
+        item = item_at(item, joint.part, 0.0)
+    return item
+
+
 @pytest.mark.parametrize("form", FILES)
 def test_joints_come_back_with_limits_axes_and_poses(tmp_path: Path, form: str) -> None:
     home = half_open()
     export_house(home, tmp_path / "home", form)
     path = next((tmp_path / "home").rglob(FILES[form]))
     back = read_house(resolve(str(path)), ReadFields())
+    remarks = tmp_path / "home/remarks.txt"
+    if form in WITHOUT_STATE:
+        n_joints = sum(len(item.joints) for item in home.items)
+        assert f"{n_joints} open doors and drawers are shut" in remarks.read_text()
+        home = replace(home, items=tuple(map(shut, home.items)))
     expected = [(item, joint) for item in home.items for joint in item.joints]
     found = [(item, joint) for item in back.items for joint in item.joints]
     assert len(found) == len(expected)

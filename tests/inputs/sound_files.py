@@ -32,6 +32,7 @@ def sound_files(n_triangles: int = N_TRIANGLES) -> dict[str, SoundFile]:
         mjcf_files,
         obj_files,
         plan_files,
+        robot_files,
         scenestate_files,
         usd_files,
     )
@@ -56,6 +57,7 @@ def sound_files(n_triangles: int = N_TRIANGLES) -> dict[str, SoundFile]:
     return {
         "glTF": SoundFile(write_gltf),
         "OBJ": SoundFile(obj_files.write_obj_home),
+        "URDF and SDF": SoundFile(robot_files.write_sdf),
         "sceneState": SoundFile(
             lambda folder: scenestate_files.hssd_like(folder, triangles=each),
             scenestate_files.N_OPENINGS, lambda file: file.parent / "objects",

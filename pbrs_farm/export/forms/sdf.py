@@ -2,7 +2,7 @@
 
 Metres, z up, gravity; a static model for the building, and a model per item with visual, convex
 collision parts, mass and lamps. Meshes are y up, as in glTF and Gazebo; their poses turn them.
-Pieces that open have a link and a joint for each part, and are closed: a world has no state of joints.
+Pieces that open have a link and a joint for each part, and are closed: Gazebo reads no state of joints.
 """
 
 from __future__ import annotations
@@ -28,6 +28,7 @@ from pbrs_farm.export.home_files import (
     digest_name,
     numbers,
     write_files,
+    write_shut_remark,
     xml_bytes,
 )
 from pbrs_farm.export.home_glb import glb_of_pieces
@@ -49,6 +50,7 @@ def write_sdf(home: ExportedHome, folder: Path) -> None:
     """<house id>.sdf and meshes/."""
     world = _World(home)
     write_files(folder, world.meshes | {f"{home.house.id}.sdf": xml_bytes(world.document)})
+    write_shut_remark(home, folder)
 
 
 class _World:

@@ -19,6 +19,7 @@ from pbrs_farm.export.home_files import (
     convex_obj,
     digest_name,
     write_files,
+    write_shut_remark,
     xml_bytes,
     z_up_points,
     z_up_pose,
@@ -35,6 +36,7 @@ def write_urdf(home: ExportedHome, folder: Path) -> None:
     """Write <house id>.urdf, meshes/ and textures/."""
     document = _Document(home)
     write_files(folder, document.files | {f"{home.house.id}.urdf": xml_bytes(document.root)})
+    write_shut_remark(home, folder)
 
 
 class _Document:

@@ -8,8 +8,10 @@ from pathlib import Path
 from typing import Final, NamedTuple
 
 from pbrs_farm.core.data_format import DataFormat
+from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import SourceFiles
 
 PLAN: Final = "plan"
@@ -22,6 +24,16 @@ class GivenFile(NamedTuple):
     path: Path
     models: str = ""  # folder of the models that the file names, "" = where its format keeps them
     part: str = ""  # selected part of a plan's file; "" = the whole file
+
+
+def root_of(given: GivenFile) -> tuple[RootFolder, str]:
+    """The folder below which all files lie, and the file's name there; BadHouse where it is not."""
+    root = Path(given.models) if given.models else given.path.parent
+    try:
+        name = given.path.resolve().relative_to(root.resolve()).as_posix()
+    except ValueError:
+        raise BadHouse(given.path, "", f"is not below --models {root}") from None
+    return RootFolder(root), name
 
 
 def no_companions(_given: GivenFile, _files: SourceFiles) -> str:

@@ -85,9 +85,9 @@ class RootFolder:
         return data
 
     @property
-    def n_read(self) -> int:
-        """Files read so far."""
-        return len(self._read)
+    def names_read(self) -> tuple[str, ...]:
+        """Names of the files read so far."""
+        return tuple(self._read)
 
     @property
     def sha256(self) -> str:

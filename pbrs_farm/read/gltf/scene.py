@@ -75,7 +75,7 @@ def read_gltf_file(path: Path, fields: ReadFields) -> House:
         rooms=folder.read(rooms, max_bytes=MAX_SCENE_BYTES),
     )
     house = read_gltf(data, path.name, fields=fields, beside=beside)
-    if folder.n_read > 1:
+    if len(folder.names_read) > 1:
         return replace(house, source=replace(house.source, sha256=folder.sha256))
     return house
 

@@ -11,7 +11,6 @@ import io
 import json
 import posixpath
 from collections.abc import Sequence
-from dataclasses import dataclass, field
 from fnmatch import fnmatchcase
 from pathlib import Path
 from typing import Any, Final
@@ -25,26 +24,19 @@ from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import House, Source
-from pbrs_farm.core.joints import JointKind
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import Gltf
 from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import SourceFiles
-from pbrs_farm.read.gltf.document import (
-    files_of_gltf,
-    gltf_document,
-    meshes_of,
-    numbers,
-    object_at,
-    placed_nodes,
-)
+from pbrs_farm.read.gltf.assembly import Assembly, files_of_asset
+from pbrs_farm.read.gltf.document import meshes_of, numbers, object_at, placed_nodes
 from pbrs_farm.read.gltf.node_classes import Mapping
-from pbrs_farm.read.gltf.node_joints import KEY, joint_row
 from pbrs_farm.read.gltf.scene import house_of_gltf
-from pbrs_farm.read.habitat.urdf import MAX_BYTES, Robot, robot_from_urdf
-from pbrs_farm.regular_files import MAX_SCENE_BYTES, text_from_bytes
+from pbrs_farm.read.robot.links import files_of_robot, model_name, placed_links, roots_of_robot
+from pbrs_farm.read.robot.urdf import MAX_BYTES, Robot, robot_from_urdf
+from pbrs_farm.regular_files import text_from_bytes
 
 _CONFIG: Final = "*.scene_dataset_config.json"
 _SECTIONS: Final = {
@@ -60,11 +52,6 @@ _MOST_LIGHTS: Final = 1_000
 _MOST_JSON_BYTES: Final = 64 * 2**20
 _MOST_FILES: Final = 200_000
 _BAKED: Final = "baked"
-_LIGHTS: Final = "KHR_lights_punctual"
-# fmt: off
-_ARRAYS: Final = ("buffers", "bufferViews", "accessors", "meshes", "materials", "textures", "images",
-                  "samplers", "nodes")
-# fmt: on
 
 
 def read_habitat(given: GivenFile, fields: ReadFields) -> House:
@@ -78,7 +65,7 @@ def read_habitat(given: GivenFile, fields: ReadFields) -> House:
     dataset = _Dataset(path, models)
     scene = dataset.json(dataset.scene)
     notes = Notes(path.name, strict=fields.strict)
-    built = _Built(path.name)
+    built = Assembly(path.name, dataset.folder, fields.max_model_triangles)
     stage = scene.get("stage_instance")
     template = stage.get("template_name") if isinstance(stage, dict) else None
     if not isinstance(template, str):
@@ -138,10 +125,13 @@ def companions_of_habitat(given: GivenFile, files: SourceFiles) -> str:
                 settings, name = dataset.template(template, kind) or ({}, "")
                 if name:
                     asset = settings.get("render_asset")
-                    names |= {name} | (dataset.files_of(name, asset) if asset else set())
+                    models = [dataset.asset(name, asset)] if asset else []
+                    names |= {name}.union(
+                        *(files_of_asset(dataset.folder, m, files) for m in models)
+                    )
             urdf = dataset.urdf(template)
             if urdf is not None:
-                names |= {urdf, *dataset.files_of_robot(urdf)}
+                names |= {urdf, *files_of_robot(dataset.robot(urdf), dataset.folder, urdf, files)}
                 names |= {found[1] for found in [dataset.template(template, "ao")] if found}
         for pattern in ("*.semantic_config.json", "*objects.csv", "*.lighting_config.json"):
             names |= set(dataset.named(pattern))
@@ -220,13 +210,6 @@ class _Dataset:
             raise BadHouse(config, "render_asset", "expected a name")
         return self.folder.name_from(posixpath.dirname(config), reference)
 
-    def files_of(self, config: str, reference: Any) -> set[str]:
-        """An asset that a config names, and the buffers and pictures outside it."""
-        asset = self.asset(config, reference)
-        data = self.folder.read(asset, max_bytes=MAX_SCENE_BYTES) or b""
-        parent = posixpath.dirname(asset)
-        return {asset, *(self.folder.name_from(parent, uri) for uri in files_of_gltf(data, asset))}
-
     def urdf(self, template: str) -> str | None:
         """Name of the URDF of an articulated object's template; None if it has none."""
         settings, config = self.template(template, "ao") or ({}, "")
@@ -240,12 +223,6 @@ class _Dataset:
     def robot(self, name: str) -> Robot:
         """The links and joints of a URDF; BadHouse where it is damaged."""
         return robot_from_urdf(self.folder.read(name, max_bytes=MAX_BYTES) or b"", name)
-
-    def files_of_robot(self, name: str) -> set[str]:
-        """The models that a URDF shows, and what they name."""
-        files = {v.file for link in self.robot(name).links for v in link.visuals}
-        models = {self.folder.name_from(posixpath.dirname(name), file) for file in files}
-        return {f for model in models if model in self._known for f in self.files_of("", model)}
 
     def class_of(self, template: str) -> str:
         """Category of a model in objects.csv, "" if it has none."""
@@ -275,155 +252,7 @@ def _names_below(root: Path) -> list[str]:
     return names
 
 
-@dataclass(slots=True)
-class _Built:
-    """One glTF document of all assets, each once; state: the assets added so far."""
-
-    file: str
-    document: dict[str, Any] = field(default_factory=dict)
-    buffers: list[bytes] = field(default_factory=list)
-    roots: list[int] = field(default_factory=list)
-    assets: dict[str, tuple[list[int], Gltf]] = field(default_factory=dict)
-    folders: dict[str, tuple[RootFolder, str]] = field(default_factory=dict)
-
-    def fetch(self, name: str) -> bytes | None:
-        """A picture beside an asset: its name below the root."""
-        root = next(iter(self.folders.values()))[0]
-        return root.read(name, max_bytes=MAX_SCENE_BYTES)
-
-    def asset(self, dataset: _Dataset, name: str) -> tuple[list[int], Gltf] | None:
-        """Root nodes of an asset in the document, added where it is new; None without the file."""
-        if name in self.assets:
-            return self.assets[name]
-        data = dataset.folder.read(name, max_bytes=MAX_SCENE_BYTES)
-        if data is None:
-            return None
-        parent = posixpath.dirname(name)
-        self.folders[name] = (dataset.folder, parent)
-
-        def beside(reference: str) -> bytes | None:
-            inner = dataset.folder.name_from(parent, reference)
-            return dataset.folder.read(inner, max_bytes=MAX_SCENE_BYTES)
-
-        gltf = gltf_document(data, name, beside)
-        self.assets[name] = (self._added(gltf, dataset, parent), gltf)
-        return self.assets[name]
-
-    def _added(self, gltf: Gltf, dataset: _Dataset, at: str) -> list[int]:
-        doc = gltf.document
-        start = {key: len(self.document.setdefault(key, [])) for key in _ARRAYS}
-        doc = {k: doc.get(k, []) for k in _ARRAYS} | {"scenes": doc.get("scenes", [])}
-        if not all(isinstance(doc[k], list) for k in doc):
-            raise BadHouse(gltf.file, "", "has invalid lists")
-        copy = json.loads(json.dumps(doc))
-        _shifted(copy, start)
-        self._add_lights(gltf, copy["nodes"])
-        for image in copy["images"]:
-            uri = image.get("uri") if isinstance(image, dict) else None
-            if isinstance(uri, str) and not uri.startswith("data:"):
-                image["uri"] = dataset.folder.name_from(at, uri)
-        for key in _ARRAYS:
-            self.document[key] += copy[key]
-        self.buffers += gltf.buffers
-        scene = gltf.document.get("scene", 0)
-        scenes = copy["scenes"]
-        fits = type(scene) is int and 0 <= scene < len(scenes) and isinstance(scenes[scene], dict)
-        nodes = scenes[scene].get("nodes", []) if fits else []
-        return [n + start["nodes"] for n in nodes if type(n) is int]
-
-    def _add_lights(self, gltf: Gltf, nodes: list[Any]) -> None:
-        """Take an asset's lights, and let its nodes name them by their new numbers."""
-        own_lights = object_at(object_at(gltf.document, "extensions"), _LIGHTS).get("lights")
-        lights = self.document.setdefault("extensions", {_LIGHTS: {"lights": []}})[_LIGHTS][
-            "lights"
-        ]
-        for node in nodes:
-            row = (
-                object_at(object_at(node, "extensions"), _LIGHTS) if isinstance(node, dict) else {}
-            )
-            if "light" in row:
-                row["light"] = _plus(row["light"], len(lights))
-        lights += own_lights if isinstance(own_lights, list) else []
-
-    def place(self, roots: list[int], matrix: F64, name: str, extras: dict[str, Any]) -> None:
-        """Put an asset's roots below a new node."""
-        node = {
-            "name": name,
-            "matrix": matrix.T.reshape(-1).tolist(),
-            "children": roots,
-            "extras": extras,
-        }
-        self.roots.append(len(self.document["nodes"]))
-        self.document["nodes"].append(node)
-
-    def light(self, row: dict[str, Any], position: F64, name: str) -> None:
-        """Set a light of KHR_lights_punctual at a point."""
-        empty: dict[str, Any] = {_LIGHTS: {"lights": []}}
-        lights = self.document.setdefault("extensions", empty)[_LIGHTS]["lights"]
-        node = {
-            "name": name,
-            "translation": position.tolist(),
-            "extensions": {_LIGHTS: {"light": len(lights)}},
-        }
-        lights.append(row)
-        self.roots.append(len(self.document["nodes"]))
-        self.document["nodes"].append(node)
-
-    def gltf(self) -> Gltf:
-        """The whole."""
-        whole = self.document | {
-            "asset": {"version": "2.0"},
-            "scene": 0,
-            "scenes": [{"nodes": self.roots}],
-        }
-        return Gltf(whole, tuple(self.buffers), self.file)
-
-
-# Where one entry names another by number -> the list it means.
-_NUMBERS: Final = {
-    "buffer": "buffers",
-    "bufferView": "bufferViews",
-    "mesh": "meshes",
-    "material": "materials",
-    "sampler": "samplers",
-    "source": "images",
-    "indices": "accessors",
-}
-
-
-def _shifted(copy: dict[str, Any], start: dict[str, int]) -> None:
-    """Add to every number that names an entry the number of those before it."""
-    for key in _ARRAYS:
-        for row in copy[key]:
-            _shift(row, start, key)
-
-
-def _shift(row: Any, start: dict[str, int], where: str) -> None:
-    if isinstance(row, list):
-        for value in row:
-            _shift(value, start, where)
-    if not isinstance(row, dict):
-        return
-    for key, value in row.items():
-        if key == "extras":
-            continue
-        if key == "attributes" and isinstance(value, dict) and "bufferView" not in row:
-            row[key] = {k: _plus(v, start["accessors"]) for k, v in value.items()}
-        elif key == "children" and isinstance(value, list):
-            row[key] = [_plus(v, start["nodes"]) for v in value]
-        elif key == "index" and where == "materials":
-            row[key] = _plus(value, start["textures"])
-        elif key in _NUMBERS and not isinstance(value, (dict, list)):
-            row[key] = _plus(value, start[_NUMBERS[key]])
-        else:
-            _shift(value, start, where)
-
-
-def _plus(value: Any, by: int) -> Any:
-    return value + by if type(value) is int else value
-
-
-def _add_stage(dataset: _Dataset, template: str, built: _Built) -> None:
+def _add_stage(dataset: _Dataset, template: str, built: Assembly) -> None:
     known = dataset.template(template, "stage")
     if known is None:
         raise BadHouse(dataset.scene, f"stage_instance: {template}", "has no stage_config.json")
@@ -432,7 +261,7 @@ def _add_stage(dataset: _Dataset, template: str, built: _Built) -> None:
     if _BAKED in name.lower():
         text = "has light baked into its pictures, so it cannot be relit"
         raise BadHouse(config, "render_asset", text, hint="take the unbaked data set")
-    added = built.asset(dataset, name)
+    added = built.asset(name)
     if added is None:
         raise BadHouse(config, "render_asset", f"{name} does not exist")
     matrix = _upright_matrix(row, added[1], config)
@@ -447,7 +276,7 @@ def _raise_if_many(errors: Sequence[BadHouse], n_lost: int, n_rows: int) -> None
         raise errors[0]
 
 
-def _add_object(dataset: _Dataset, row: Any, origin: Any, place: str, built: _Built) -> bool:
+def _add_object(dataset: _Dataset, row: Any, origin: Any, place: str, built: Assembly) -> bool:
     """Whether an object instance has a model here; it is placed."""
     if not isinstance(row, dict) or not isinstance(row.get("template_name"), str):
         raise BadHouse(dataset.scene, f"{place}.template_name", "expected a name")
@@ -455,7 +284,7 @@ def _add_object(dataset: _Dataset, row: Any, origin: Any, place: str, built: _Bu
     settings, config = dataset.template(template, "object") or ({}, "")
     added = None
     if settings.get("render_asset"):
-        added = built.asset(dataset, dataset.asset(config, settings["render_asset"]))
+        added = built.asset(dataset.asset(config, settings["render_asset"]))
     if added is None:
         return False
     roots, gltf = added
@@ -487,7 +316,9 @@ def _matrix_of_instance(row: dict[str, Any], place: str, file: str) -> F64:
     return matrix
 
 
-def _add_articulated(dataset: _Dataset, scene: dict[str, Any], built: _Built, notes: Notes) -> None:
+def _add_articulated(
+    dataset: _Dataset, scene: dict[str, Any], built: Assembly, notes: Notes
+) -> None:
     """Place the articulated objects; a note counts those whose URDF or models are not here."""
     rows = scene.get(_ARTICULATED) or []
     if not isinstance(rows, list) or len(rows) > _MOST_INSTANCES:
@@ -511,12 +342,12 @@ def _add_articulated(dataset: _Dataset, scene: dict[str, Any], built: _Built, no
     if n_missing:
         notes.add("missing-model", _ARTICULATED, f"{n_missing} of {len(rows)} have no model here")
     if n_unread:
-        text = f"{n_unread} boxes, cylinders or spheres of URDF are not read"
+        text = f"{n_unread} shapes of URDF other than meshes, boxes, cylinders and spheres"
         notes.add("unread-part", _ARTICULATED, text)
 
 
 def _add_robot(
-    dataset: _Dataset, urdf: str, robot: Robot, row: dict[str, Any], place: str, built: _Built
+    dataset: _Dataset, urdf: str, robot: Robot, row: dict[str, Any], place: str, built: Assembly
 ) -> bool:
     """Place the links of a robot as an instance says; whether any of its models is here."""
     template = row["template_name"]
@@ -534,39 +365,16 @@ def _add_robot(
     world_from_robot = _matrix_of_instance(row, place, dataset.scene) @ inner
     # habitat-sim scales offsets, shapes and limits, but not the pose of a slide.
     scale = float(np.cbrt(abs(np.linalg.det(world_from_robot[:3, :3])))) or 1.0
-    nodes = built.document.setdefault("nodes", [])
-    # Nodes of assets come first: adding them moves the list on.
-    shown: dict[str, list[tuple[list[int], F64]]] = {}
-    for link in robot.links:
-        for visual in link.visuals:
-            name = dataset.folder.name_from(posixpath.dirname(urdf), visual.file)
-            added = built.asset(dataset, name)
-            if added is not None:
-                shown.setdefault(link.name, []).append((added[0], visual.link_from_model))
-    if not shown:
+    parent = posixpath.dirname(urdf)
+
+    def roots_of(file: str) -> list[int] | None:
+        added = built.asset(model_name(file, dataset.folder, parent))
+        return added and added[0]
+
+    node_of = placed_links(built, robot, roots_of, values, scale)
+    if not node_of:
         return False
-    numbers_of: dict[str, int] = {}
-    roots: list[int] = []
-    for link in robot.links:
-        node: dict[str, Any] = {"name": "", "children": []}
-        if link.joint is not None:
-            value = values.get(link.joint.name, 0.0)
-            if link.joint.kind is JointKind.PRISMATIC:
-                value /= scale
-            node["matrix"] = link.joint.parent_from_link(value).T.ravel().tolist()
-            if link.joint.kind is not None:
-                limits = link.joint.lower, link.joint.upper
-                extras = joint_row(
-                    link.name, link.joint.kind, (0, 0, 0), link.joint.axis, limits, value
-                )
-                node["extras"] = {KEY: extras}
-        for models, matrix in shown.get(link.name, []):
-            node["children"].append(len(nodes))
-            nodes.append({"name": "", "matrix": matrix.T.ravel().tolist(), "children": models})
-        numbers_of[link.name] = len(nodes)
-        nodes.append(node)
-        above = roots if link.parent is None else nodes[numbers_of[link.parent]]["children"]
-        above.append(numbers_of[link.name])
+    roots = roots_of_robot(robot, node_of)
     name = dataset.class_of(template) or posixpath.basename(template).removesuffix(".urdf")
     user_fields = row.get("user_defined")
     own_fields = dict(user_fields) if isinstance(user_fields, dict) else {}
@@ -574,7 +382,7 @@ def _add_robot(
     return True
 
 
-def _add_lights(dataset: _Dataset, named: Any, built: _Built, notes: Notes) -> None:
+def _add_lights(dataset: _Dataset, named: Any, built: Assembly, notes: Notes) -> None:
     """Place the point lights of a lighting config; a note counts those of other kinds.
 
     Habitat's intensities have no unit: each light is as strong as a bulb.
@@ -600,7 +408,7 @@ def _add_lights(dataset: _Dataset, named: Any, built: _Built, notes: Notes) -> N
         position = numbers(where, row.get("position", [0, 0, 0]), 3, f"{place}.position")
         colour = numbers(where, row.get("color", [1, 1, 1]), 3, f"{place}.color").tolist()
         bulb = {"type": "point", "color": colour, "extras": {"assumed": True}}
-        built.light(bulb, position, f"lamp {key[:20]}")
+        built.roots.append(built.light_node(bulb, position, f"lamp {key[:20]}"))
     if n_left_out:
         text = f"{n_left_out} are directional, dark or not of the room; left out"
         notes.add("unread-part", f"{config}: lights", text)

@@ -20,7 +20,7 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import GlbWriter, Gltf
 from pbrs_farm.home.room_use import named_kind
 from pbrs_farm.quiet_mujoco import mujoco
-from pbrs_farm.read.common.format import GivenFile
+from pbrs_farm.read.common.format import GivenFile, root_of
 from pbrs_farm.read.common.name_classes import class_of_node_name
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.gltf.document import UNREAD
@@ -37,7 +37,7 @@ from pbrs_farm.read.mjcf.geoms import (
     shape_of,
     texture_of,
 )
-from pbrs_farm.read.mjcf.model_files import files_of_model, root_of
+from pbrs_farm.read.mjcf.model_files import files_of_model
 
 _Row = dict[str, Any]
 _OBJECT: Final = mujoco.mjtObj

@@ -6,7 +6,6 @@ MuJoCo opens files itself, so they are checked first: none may be outside the mo
 from __future__ import annotations
 
 import posixpath
-from pathlib import Path
 from typing import Final
 from xml.etree.ElementTree import Element, ParseError
 
@@ -14,7 +13,7 @@ from defusedxml import DefusedXmlException
 from defusedxml.ElementTree import fromstring
 
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.read.common.format import GivenFile
+from pbrs_farm.read.common.format import GivenFile, root_of
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import SourceFiles
 
@@ -22,16 +21,6 @@ MAX_XML_BYTES: Final = 128 * 2**20
 _MOST_FILES: Final = 20_000
 _MODELS: Final = ("include", "model")  # elements whose file is XML, too
 _FOLDERS: Final = ("meshdir", "texturedir", "assetdir")
-
-
-def root_of(given: GivenFile) -> tuple[RootFolder, str]:
-    """The folder below which all files lie, and the model's name there; BadHouse where it is not."""
-    root = Path(given.models) if given.models else given.path.parent
-    try:
-        name = given.path.resolve().relative_to(root.resolve()).as_posix()
-    except ValueError:
-        raise BadHouse(given.path, "", f"is not below --models {root}") from None
-    return RootFolder(root), name
 
 
 def files_of_model(folder: RootFolder, name: str) -> set[str]:

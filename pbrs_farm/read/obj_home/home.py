@@ -8,26 +8,23 @@ from __future__ import annotations
 
 import math
 import re
-from typing import Any, Final
-from urllib.parse import quote
+from typing import Final
 
 import numpy as np
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.house import House, ItemKind, Source
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.formats.glb import GlbWriter
 from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.name_classes import class_of_node_name
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.common.source_files import SourceFiles, read_mtl
+from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.gltf.node_classes import Mapping
+from pbrs_farm.read.gltf.obj_document import document_of_groups, files_of_obj, materials_of_obj
 from pbrs_farm.read.gltf.scene import house_of_gltf
-from pbrs_farm.read.mesh.mtl import ObjMaterial, laid
 from pbrs_farm.read.mesh.obj import Mesh, parse_obj
 from pbrs_farm.regular_files import MAX_SCENE_BYTES
 
@@ -57,14 +54,15 @@ def read_obj_home(given: GivenFile, fields: ReadFields) -> House:
         raise BadHouse(
             str(path), "", "is a model, not a home: no groups named floor and wall", hint=hint
         )
-    library = next(iter(model.mtllibs), f"{path.stem}.mtl")
-    mtl = {m.name: m for m in reversed(read_mtl(folder, folder.name_from("", library)) or ())}
+    mtl = materials_of_obj(model.mtllibs, folder, path.name)
     walls = [m for name, ms in groups.items() if kinds[name] is ItemKind.WALL for m in ms]
     floors = [m for name, ms in groups.items() if kinds[name] is ItemKind.FLOOR for m in ms]
     matrix, guess = _world_from_file(data, walls, floors)
     if guess:
         notes.add("assumed-unit", path.name, guess)
-    document, writer = _document(groups, mtl, matrix)
+    # Words that modelling programs add are left out of names.
+    named = [(_FILLERS.sub(" ", name).strip() or name, ms) for name, ms in groups.items()]
+    document, writer = document_of_groups(named, mtl, matrix)
     source = Source("obj-home", path.name, keys.sha256(data))
     return house_of_gltf(
         writer.gltf(document, path.name),
@@ -83,12 +81,10 @@ def companions_of_obj_home(given: GivenFile, files: SourceFiles) -> str:
     folder = RootFolder(path.parent)
     try:
         data = folder.read(path.name, max_bytes=MAX_SCENE_BYTES) or b""
-        line = re.search(rb"^mtllib[ \t]+(.+?)\s*$", data, re.MULTILINE)
-        reference = line[1].decode("utf-8", "replace") if line else f"{path.stem}.mtl"
-        library = folder.name_from("", reference)
+        names = files_of_obj(data, folder, path.name, files)
     except (BadHouse, OSError):
         return ""
-    return files.digest(folder, [library, *files.pictures(folder, library)])
+    return files.digest(folder, names)
 
 
 def _kind_of_group(name: str) -> ItemKind | None:
@@ -112,62 +108,3 @@ def _world_from_file(data: bytes, walls: list[Mesh], floors: list[Mesh]) -> tupl
     if up == 2:
         matrix[:3, :3] = matrix[:3, :3] @ [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
     return matrix, guess
-
-
-def _document(
-    groups: dict[str, list[Mesh]], mtl: dict[str, ObjMaterial], matrix: F64
-) -> tuple[dict[str, Any], GlbWriter]:
-    """The glTF document of the groups, a node each below one that turns and scales them."""
-    writer = GlbWriter()
-    nodes: list[dict[str, Any]] = []
-    meshes: list[dict[str, Any]] = []
-    images: list[dict[str, str]] = []
-    numbers = {name: k for k, name in enumerate(mtl)}
-    materials = [_material(m, images) for m in mtl.values()]
-    for name, parts in groups.items():
-        primitives = []
-        for part in parts:
-            mesh = laid(part, mtl.get(part.material))
-            row: dict[str, Any] = {
-                "attributes": {
-                    "POSITION": writer.add_vertices(
-                        mesh.positions.astype(np.float32), with_bounds=True
-                    ),
-                    "NORMAL": writer.add_vertices(mesh.normals.astype(np.float32)),
-                },
-                "indices": writer.add_faces(mesh.faces),
-            }
-            if mesh.uvs is not None:
-                uvs = (mesh.uvs * (1, -1) + (0, 1)).astype(np.float32)
-                row["attributes"]["TEXCOORD_0"] = writer.add_vertices(uvs)
-            if mesh.material in numbers:
-                row["material"] = numbers[mesh.material]
-            primitives.append(row)
-        nodes.append({"name": _FILLERS.sub(" ", name).strip() or name, "mesh": len(meshes)})
-        meshes.append({"primitives": primitives})
-    nodes.append({"children": list(range(len(nodes))), "matrix": matrix.T.ravel().tolist()})
-    return {
-        "asset": {"version": "2.0"},
-        "scene": 0,
-        "scenes": [{"nodes": [len(nodes) - 1]}],
-        "nodes": nodes,
-        "meshes": meshes,
-        "materials": materials,
-        "images": images,
-        "textures": [{"source": k} for k in range(len(images))],
-    }, writer
-
-
-def _material(material: ObjMaterial, images: list[dict[str, str]]) -> dict[str, Any]:
-    """A material of glTF; its picture is added to images."""
-    colour = linear_from_srgb(np.asarray(material.kd, np.float64)).tolist()
-    shading: dict[str, Any] = {
-        "baseColorFactor": [*(colour if not material.map_kd else (1.0, 1.0, 1.0)), material.d],
-        "metallicFactor": 0.0,
-        "roughnessFactor": float(np.clip(math.sqrt(2 / (material.ns + 2)), 0.05, 1.0)),
-    }
-    if material.map_kd:
-        shading["baseColorTexture"] = {"index": len(images)}
-        images.append({"uri": quote(material.map_kd)})
-    blended = {"alphaMode": "BLEND"} if material.d < 1 else {}
-    return {"name": material.name, "pbrMetallicRoughness": shading} | blended

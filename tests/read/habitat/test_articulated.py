@@ -14,7 +14,7 @@ from pbrs_farm.core.joints import JointKind
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve
-from pbrs_farm.read.habitat.urdf import robot_from_urdf
+from pbrs_farm.read.robot.urdf import robot_from_urdf
 from tests.inputs.habitat_files import written
 from tests.read.gltf.gltf_scenes import Scene
 from tests.read.habitat.habitat_sets import dataset

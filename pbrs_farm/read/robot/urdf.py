@@ -1,4 +1,4 @@
-"""Read an articulated object from URDF: links, their visible shapes, their joints; no effects."""
+"""Parse URDF: links, their visible shapes, their joints; no effects."""
 
 from __future__ import annotations
 
@@ -17,7 +17,13 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.joints import JointKind
 
 MAX_BYTES: Final = 16 * 2**20
-_MOST_LINKS: Final = 1_000
+_MOST_LINKS: Final = 20_000
+GREY: Final = (0.7, 0.7, 0.7, 1.0)  # of solids without a colour
+_SOLIDS: Final = {
+    "box": (("size", 3),),
+    "cylinder": (("radius", 1), ("length", 1)),
+    "sphere": (("radius", 1),),
+}  # solid -> its fields, each with its number of values
 _KINDS: Final = {
     "revolute": JointKind.REVOLUTE,
     "continuous": JointKind.REVOLUTE,
@@ -26,11 +32,21 @@ _KINDS: Final = {
 
 
 @dataclass(frozen=True, slots=True)
-class Visual:
-    """A model that shows a link."""
+class Solid:
+    """A shape without a file, about its middle; a cylinder is along z."""
 
-    file: str  # as the URDF names it
+    kind: str  # box, cylinder or sphere
+    size: tuple[float, ...]  # metres: sides, radius and length, or radius
+    rgba: tuple[float, float, float, float]  # sRGB-encoded
+
+
+@dataclass(frozen=True, slots=True)
+class Visual:
+    """A model or solid that shows a link."""
+
+    file: str  # as the robot's file names it; "" for a solid
     link_from_model: F64  # (4, 4), with its scale
+    solid: Solid | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -69,8 +85,8 @@ class Robot:
     """The links of a URDF, parents first."""
 
     links: tuple[Link, ...]
-    moving: tuple[str, ...]  # names of joints that are not fixed, in the file's order
-    n_unread: int  # skipped primitive shapes: boxes, cylinders, spheres
+    moving: tuple[str, ...] = ()  # names of joints that are not fixed, in the file's order
+    n_unread: int = 0  # skipped shapes: planes, capsules, height maps
 
     def values(self, pose: Any, file: str, place: str, order: str = "") -> dict[str, float]:
         """Joint values by name, radians or metres, from a Habitat scene.
@@ -101,9 +117,10 @@ class Robot:
 def robot_from_urdf(data: bytes, file: str) -> Robot:
     """The links and joints of a URDF; BadHouse where it is damaged, or its joints make no tree.
 
-    Collision shapes, masses and materials are not read: Habitat shows a model's own.
+    Collision shapes and masses are not read, nor the materials of models, which have their own.
     """
-    root = _parsed(data, file)
+    root = parsed_xml(data, file, "robot")
+    colours = {str(row.get("name")): row for row in root.findall("material")}
     rows = {str(row.get("name")): row for row in root.findall("link")}
     if not rows or len(rows) > _MOST_LINKS:
         raise BadHouse(file, "link", f"has {len(rows)} links; 1 to {_MOST_LINKS} are read")
@@ -120,7 +137,7 @@ def robot_from_urdf(data: bytes, file: str) -> Robot:
     links, waiting, n_unread = [], list(reversed(below.get(None, []))), 0
     while waiting:
         name = waiting.pop()
-        visuals, n = _visuals(rows[name], file)
+        visuals, n = _visuals(rows[name], colours, file)
         n_unread += n
         above = hung.get(name)
         parent_name = None if above is None else above[0]
@@ -132,13 +149,14 @@ def robot_from_urdf(data: bytes, file: str) -> Robot:
     return Robot(tuple(links), moving, n_unread)
 
 
-def _parsed(data: bytes, file: str) -> Element:
+def parsed_xml(data: bytes, file: str, tag: str) -> Element:
+    """The root of an XML document; BadHouse if it is damaged or has another tag."""
     try:
         root: Element = fromstring(data, forbid_dtd=True)
     except (ParseError, DefusedXmlException, ValueError, LookupError, RecursionError) as error:
         raise BadHouse(file, "", f"is not valid XML: {str(error)[:100]}") from None
-    if root.tag != "robot":
-        raise BadHouse(file, "", f"begins with <{str(root.tag)[:40]}>, not <robot>")
+    if root.tag != tag:
+        raise BadHouse(file, "", f"begins with <{str(root.tag)[:40]}>, not <{tag}>")
     return root
 
 
@@ -154,31 +172,57 @@ def _joint(row: Element, file: str) -> LinkJoint:
     name, kind = str(row.get("name")), _KINDS.get(str(row.get("type")))
     place = f"joint {name[:60]}"
     axis_row, limit = row.find("axis"), row.find("limit")
-    axis = _numbers(None if axis_row is None else axis_row.get("xyz"), (1.0, 0.0, 0.0), file, place)
+    axis = numbers_of(
+        None if axis_row is None else axis_row.get("xyz"), (1.0, 0.0, 0.0), file, place
+    )
     length = float(np.linalg.norm(axis))
     if length < 1e-9:
         raise BadHouse(file, place, "its axis has no direction")
     turns = np.pi if row.get("type") == "continuous" else 0.0
     lower, upper = (
-        float(_numbers(None if limit is None else limit.get(key), (default,), file, place)[0])
+        float(numbers_of(None if limit is None else limit.get(key), (default,), file, place)[0])
         for key, default in (("lower", -turns), ("upper", turns))
     )
     return LinkJoint(name, kind, _origin(row, file, place), axis / length, lower, upper)
 
 
-def _visuals(row: Element, file: str) -> tuple[tuple[Visual, ...], int]:
-    """The models that show a link, and how many other shapes do."""
+def _visuals(
+    row: Element, colours: Mapping[str, Element], file: str
+) -> tuple[tuple[Visual, ...], int]:
+    """The models and solids that show a link, and the number of other shapes."""
     visuals, n_unread = [], 0
     place = f"link {str(row.get('name'))[:60]}"
     for visual in row.findall("visual"):
-        mesh = visual.find("geometry/mesh")
-        if mesh is None or not mesh.get("filename"):
-            n_unread += 1
+        mesh, matrix = visual.find("geometry/mesh"), _origin(visual, file, place)
+        if mesh is not None and mesh.get("filename"):
+            matrix[:3, :3] *= numbers_of(mesh.get("scale"), (1.0, 1.0, 1.0), file, place)
+            visuals.append(Visual(str(mesh.get("filename")), matrix))
             continue
-        matrix = _origin(visual, file, place)
-        matrix[:3, :3] *= _numbers(mesh.get("scale"), (1.0, 1.0, 1.0), file, place)
-        visuals.append(Visual(str(mesh.get("filename")), matrix))
+        named = visual.find("material")
+        colour = named if named is None or len(named) else colours.get(str(named.get("name")))
+        said = None if colour is None else colour.find("color")
+        rgba = numbers_of(None if said is None else said.get("rgba"), GREY, file, place)
+        solid = solid_of(visual, rgba, file, place)
+        n_unread += solid is None
+        if solid is not None:
+            visuals.append(Visual("", matrix, solid))
     return tuple(visuals), n_unread
+
+
+def solid_of(visual: Element, rgba: F64, file: str, place: str) -> Solid | None:
+    """The solid of a visual of URDF (attributes) or SDF (elements); None for another shape."""
+    for kind, fields in _SOLIDS.items():
+        shape = visual.find(f"geometry/{kind}")
+        if shape is not None:
+            texts = [shape.get(key) or shape.findtext(key) for key, _ in fields]
+            sizes = [
+                numbers_of(text, (0.0,) * n, file, place)
+                for text, (_, n) in zip(texts, fields, strict=True)
+            ]
+            size = tuple(np.concatenate(sizes).tolist())
+            r, g, b, opacity = rgba.clip(0, 1).tolist()
+            return Solid(kind, size, (r, g, b, opacity)) if min(size) > 0 else None
+    return None
 
 
 def _origin(row: Element, file: str, place: str) -> F64:
@@ -186,13 +230,14 @@ def _origin(row: Element, file: str, place: str) -> F64:
     if origin is not None:
         zero = (0.0, 0.0, 0.0)
         # Roll about x, then pitch about y, then yaw about z, of fixed axes.
-        rpy = _numbers(origin.get("rpy"), zero, file, place)
+        rpy = numbers_of(origin.get("rpy"), zero, file, place)
         matrix[:3, :3] = Rotation.from_euler("xyz", rpy).as_matrix()
-        matrix[:3, 3] = _numbers(origin.get("xyz"), zero, file, place)
+        matrix[:3, 3] = numbers_of(origin.get("xyz"), zero, file, place)
     return matrix
 
 
-def _numbers(text: str | None, default: tuple[float, ...], file: str, place: str) -> F64:
+def numbers_of(text: str | None, default: tuple[float, ...], file: str, place: str) -> F64:
+    """The numbers of a text, as many as the default has; BadHouse if they are not finite."""
     if text is None:
         return np.array(default)
     try:

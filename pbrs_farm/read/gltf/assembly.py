@@ -1,0 +1,185 @@
+"""One glTF document of many assets, for readers of scenes that place files of models. Effects: reads files."""
+
+from __future__ import annotations
+
+import json
+import posixpath
+from dataclasses import dataclass, field
+from typing import Any, Final
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.formats.glb import Gltf
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.gltf.document import files_of_gltf, gltf_document, object_at
+from pbrs_farm.read.gltf.obj_document import files_of_obj, gltf_of_obj
+from pbrs_farm.regular_files import MAX_SCENE_BYTES
+
+_LIGHTS: Final = "KHR_lights_punctual"
+# fmt: off
+_ARRAYS: Final = ("buffers", "bufferViews", "accessors", "meshes", "materials", "textures", "images",
+                  "samplers", "nodes")
+# fmt: on
+
+
+def files_of_asset(folder: RootFolder, name: str, files: SourceFiles) -> set[str]:
+    """An asset and the buffers, material libraries and pictures outside it, as names below the folder."""
+    data = folder.read(name, max_bytes=MAX_SCENE_BYTES) or b""
+    if name.lower().endswith(".obj"):
+        return {name, *files_of_obj(data, folder, name, files)}
+    parent = posixpath.dirname(name)
+    return {name, *(folder.name_from(parent, uri) for uri in files_of_gltf(data, name))}
+
+
+@dataclass(slots=True)
+class Assembly:
+    """One glTF document of all assets, each once; state: the assets added so far."""
+
+    file: str  # name of the scene, for messages
+    folder: RootFolder
+    max_triangles: int
+    document: dict[str, Any] = field(default_factory=dict)
+    buffers: list[bytes] = field(default_factory=list)
+    roots: list[int] = field(default_factory=list)
+    assets: dict[str, tuple[list[int], Gltf]] = field(default_factory=dict)
+
+    def fetch(self, name: str) -> bytes | None:
+        """The bytes of a picture by its name below the root; None without the file."""
+        return self.folder.read(name, max_bytes=MAX_SCENE_BYTES)
+
+    def asset(self, name: str) -> tuple[list[int], Gltf] | None:
+        """Root nodes of an asset (glTF or OBJ) in the document, added if it is new; None without the file."""
+        if name in self.assets:
+            return self.assets[name]
+        data = self.fetch(name)
+        if data is None:
+            return None
+        parent = posixpath.dirname(name)
+        if name.lower().endswith(".obj"):
+            gltf, at = gltf_of_obj(data, self.folder, name, self.max_triangles), ""
+        else:
+            gltf = gltf_document(data, name, lambda r: self.fetch(self.folder.name_from(parent, r)))
+            at = parent
+        self.assets[name] = (self._added(gltf, at), gltf)
+        return self.assets[name]
+
+    def added(self, key: str, gltf: Gltf) -> list[int]:
+        """Root nodes of a document without pictures, added if its key is new."""
+        if key not in self.assets:
+            self.assets[key] = (self._added(gltf, ""), gltf)
+        return self.assets[key][0]
+
+    def _added(self, gltf: Gltf, at: str) -> list[int]:
+        doc = gltf.document
+        start = {key: len(self.document.setdefault(key, [])) for key in _ARRAYS}
+        doc = {k: doc.get(k, []) for k in _ARRAYS} | {"scenes": doc.get("scenes", [])}
+        if not all(isinstance(doc[k], list) for k in doc):
+            raise BadHouse(gltf.file, "", "has invalid lists")
+        copy = json.loads(json.dumps(doc))
+        _shifted(copy, start)
+        self._add_lights(gltf, copy["nodes"])
+        for image in copy["images"]:
+            uri = image.get("uri") if isinstance(image, dict) else None
+            if isinstance(uri, str) and not uri.startswith("data:"):
+                image["uri"] = self.folder.name_from(at, uri)
+        for key in _ARRAYS:
+            self.document[key] += copy[key]
+        self.buffers += gltf.buffers
+        scene = gltf.document.get("scene", 0)
+        scenes = copy["scenes"]
+        fits = type(scene) is int and 0 <= scene < len(scenes) and isinstance(scenes[scene], dict)
+        nodes = scenes[scene].get("nodes", []) if fits else []
+        return [n + start["nodes"] for n in nodes if type(n) is int]
+
+    def _add_lights(self, gltf: Gltf, nodes: list[Any]) -> None:
+        """Take an asset's lights, and let its nodes name them by their new numbers."""
+        own_lights = object_at(object_at(gltf.document, "extensions"), _LIGHTS).get("lights")
+        lights = self.document.setdefault("extensions", {_LIGHTS: {"lights": []}})[_LIGHTS][
+            "lights"
+        ]
+        for node in nodes:
+            row = (
+                object_at(object_at(node, "extensions"), _LIGHTS) if isinstance(node, dict) else {}
+            )
+            if "light" in row:
+                row["light"] = _plus(row["light"], len(lights))
+        lights += own_lights if isinstance(own_lights, list) else []
+
+    def place(self, roots: list[int], matrix: F64, name: str, extras: dict[str, Any]) -> None:
+        """Put an asset's roots below a new node."""
+        node = {
+            "name": name,
+            "matrix": matrix.T.reshape(-1).tolist(),
+            "children": roots,
+            "extras": extras,
+        }
+        self.roots.append(len(self.document["nodes"]))
+        self.document["nodes"].append(node)
+
+    def light_node(self, row: dict[str, Any], position: F64, name: str) -> int:
+        """The number of a new node, still without a parent, with a light of KHR_lights_punctual."""
+        empty: dict[str, Any] = {_LIGHTS: {"lights": []}}
+        lights = self.document.setdefault("extensions", empty)[_LIGHTS]["lights"]
+        node = {
+            "name": name,
+            "translation": position.tolist(),
+            "extensions": {_LIGHTS: {"light": len(lights)}},
+        }
+        lights.append(row)
+        nodes = self.document.setdefault("nodes", [])
+        nodes.append(node)
+        return len(nodes) - 1
+
+    def gltf(self) -> Gltf:
+        """The whole document."""
+        whole = self.document | {
+            "asset": {"version": "2.0"},
+            "scene": 0,
+            "scenes": [{"nodes": self.roots}],
+        }
+        return Gltf(whole, tuple(self.buffers), self.file)
+
+
+# Where one entry names another by number -> the list it means.
+_NUMBERS: Final = {
+    "buffer": "buffers",
+    "bufferView": "bufferViews",
+    "mesh": "meshes",
+    "material": "materials",
+    "sampler": "samplers",
+    "source": "images",
+    "indices": "accessors",
+}
+
+
+def _shifted(copy: dict[str, Any], start: dict[str, int]) -> None:
+    """Add to every number that names an entry the number of those before it."""
+    for key in _ARRAYS:
+        for row in copy[key]:
+            _shift(row, start, key)
+
+
+def _shift(row: Any, start: dict[str, int], where: str) -> None:
+    if isinstance(row, list):
+        for value in row:
+            _shift(value, start, where)
+    if not isinstance(row, dict):
+        return
+    for key, value in row.items():
+        if key == "extras":
+            continue
+        if key == "attributes" and isinstance(value, dict) and "bufferView" not in row:
+            row[key] = {k: _plus(v, start["accessors"]) for k, v in value.items()}
+        elif key == "children" and isinstance(value, list):
+            row[key] = [_plus(v, start["nodes"]) for v in value]
+        elif key == "index" and where == "materials":
+            row[key] = _plus(value, start["textures"])
+        elif key in _NUMBERS and not isinstance(value, (dict, list)):
+            row[key] = _plus(value, start[_NUMBERS[key]])
+        else:
+            _shift(value, start, where)
+
+
+def _plus(value: Any, by: int) -> Any:
+    return value + by if type(value) is int else value

@@ -1,0 +1,121 @@
+"""An OBJ and its material libraries as a glTF document. Effects: reads libraries."""
+
+from __future__ import annotations
+
+import math
+import posixpath
+import re
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any, Final
+from urllib.parse import quote
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.frames import linear_from_srgb
+from pbrs_farm.formats.glb import GlbWriter, Gltf
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import SourceFiles, read_mtl
+from pbrs_farm.read.mesh.mtl import ObjMaterial, laid
+from pbrs_farm.read.mesh.obj import Mesh, parse_obj
+
+_MTLLIB: Final = re.compile(rb"^mtllib[ \t]+(.+?)\s*$", re.MULTILINE)
+
+
+def gltf_of_obj(data: bytes, folder: RootFolder, name: str, max_triangles: int) -> Gltf:
+    """The document of a model, one node; name: of its file below the folder.
+
+    Pictures are named from the root of the folder. Raises BadHouse as parse_obj does.
+    """
+    model = parse_obj(data, name, max_triangles=max_triangles)
+    mtl = materials_of_obj(model.mtllibs, folder, name)
+    document, writer = document_of_groups([("", model.meshes)], mtl, np.eye(4))
+    return writer.gltf(document, name)
+
+
+def files_of_obj(data: bytes, folder: RootFolder, name: str, files: SourceFiles) -> set[str]:
+    """Names below the root of an OBJ's material libraries and their pictures."""
+    references = [line.decode("utf-8", "replace") for line in _MTLLIB.findall(data)]
+    libraries = _libraries(references, folder, name)
+    return {*libraries, *(p for library in libraries for p in files.pictures(folder, library))}
+
+
+def materials_of_obj(
+    references: Sequence[str], folder: RootFolder, name: str
+) -> dict[str, ObjMaterial]:
+    """The materials of all libraries by name, the first of each name; {} without a library."""
+    materials: dict[str, ObjMaterial] = {}
+    for library in _libraries(references, folder, name):
+        for material in read_mtl(folder, library) or ():
+            materials.setdefault(material.name, material)
+    return materials
+
+
+def _libraries(references: Sequence[str], folder: RootFolder, name: str) -> list[str]:
+    """Names below the root; a line may name several. Without a line, the library of the model's name."""
+    parent, stem = posixpath.split(name.rpartition(".")[0])
+    libraries = []
+    for line in references or [f"{stem}.mtl"]:
+        whole = folder.name_from(parent, line)
+        is_one = folder.path(whole) is not None
+        libraries += [whole] if is_one else [folder.name_from(parent, w) for w in line.split()]
+    return list(dict.fromkeys(libraries))
+
+
+def document_of_groups(
+    groups: Iterable[tuple[str, Sequence[Mesh]]], mtl: Mapping[str, ObjMaterial], matrix: F64
+) -> tuple[dict[str, Any], GlbWriter]:
+    """The document of groups, each with its name, below a node that turns and scales them."""
+    writer = GlbWriter()
+    nodes: list[dict[str, Any]] = []
+    meshes: list[dict[str, Any]] = []
+    images: list[dict[str, str]] = []
+    numbers = {name: k for k, name in enumerate(mtl)}
+    materials = [_material(m, images) for m in mtl.values()]
+    for name, parts in groups:
+        primitives = []
+        for part in parts:
+            mesh = laid(part, mtl.get(part.material))
+            row: dict[str, Any] = {
+                "attributes": {
+                    "POSITION": writer.add_vertices(
+                        mesh.positions.astype(np.float32), with_bounds=True
+                    ),
+                    "NORMAL": writer.add_vertices(mesh.normals.astype(np.float32)),
+                },
+                "indices": writer.add_faces(mesh.faces),
+            }
+            if mesh.uvs is not None:
+                uvs = (mesh.uvs * (1, -1) + (0, 1)).astype(np.float32)
+                row["attributes"]["TEXCOORD_0"] = writer.add_vertices(uvs)
+            if mesh.material in numbers:
+                row["material"] = numbers[mesh.material]
+            primitives.append(row)
+        nodes.append({"name": name, "mesh": len(meshes)})
+        meshes.append({"primitives": primitives})
+    nodes.append({"children": list(range(len(nodes))), "matrix": matrix.T.ravel().tolist()})
+    return {
+        "asset": {"version": "2.0"},
+        "scene": 0,
+        "scenes": [{"nodes": [len(nodes) - 1]}],
+        "nodes": nodes,
+        "meshes": meshes,
+        "materials": materials,
+        "images": images,
+        "textures": [{"source": k} for k in range(len(images))],
+    }, writer
+
+
+def _material(material: ObjMaterial, images: list[dict[str, str]]) -> dict[str, Any]:
+    """A material of glTF; its picture is added to images."""
+    colour = linear_from_srgb(np.asarray(material.kd, np.float64)).tolist()
+    shading: dict[str, Any] = {
+        "baseColorFactor": [*(colour if not material.map_kd else (1.0, 1.0, 1.0)), material.d],
+        "metallicFactor": 0.0,
+        "roughnessFactor": float(np.clip(math.sqrt(2 / (material.ns + 2)), 0.05, 1.0)),
+    }
+    if material.map_kd:
+        shading["baseColorTexture"] = {"index": len(images)}
+        images.append({"uri": quote(material.map_kd)})
+    blended = {"alphaMode": "BLEND"} if material.d < 1 else {}
+    return {"name": material.name, "pbrMetallicRoughness": shading} | blended

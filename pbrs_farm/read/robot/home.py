@@ -1,0 +1,172 @@
+"""A home in URDF or SDF -> House. Effects: reads the file and its models.
+
+Links become nodes of one glTF scene for the reader of glTF. Both formats are z up, in metres.
+"""
+
+from __future__ import annotations
+
+import posixpath
+from collections.abc import Callable
+from typing import Any, Final
+
+import numpy as np
+
+from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.house import House, Source
+from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.format import GivenFile, root_of
+from pbrs_farm.read.common.name_classes import class_of_node_name
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.gltf.assembly import Assembly, files_of_asset
+from pbrs_farm.read.gltf.document import UNREAD
+from pbrs_farm.read.gltf.node_classes import Mapping, mapping_from_json
+from pbrs_farm.read.gltf.scene import house_of_gltf, side_files
+from pbrs_farm.read.robot.links import model_name, placed_links, roots_of_robot
+from pbrs_farm.read.robot.sdf import SdfModel, models_of_sdf
+from pbrs_farm.read.robot.urdf import MAX_BYTES, Link, Robot, robot_from_urdf
+
+_Y_UP: Final = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+_MODELS: Final = (".glb", ".gltf", ".obj")
+_MOST_JSON_BYTES: Final = 16 * 2**20
+
+
+def read_robot(given: GivenFile, fields: ReadFields) -> House:
+    """Read a home. Raises BadHouse, naming file and place; a damaged or missing model is a note.
+
+    given.models: a folder that holds the file and its models, if these are not below the file's own.
+    All joints are at 0: neither form has a state.
+    """
+    folder, name = root_of(given)
+    notes = Notes(name, strict=fields.strict)
+    scene = _Scene(Assembly(name, folder, fields.max_model_triangles), notes)
+    for model in _models(folder, name, notes):
+        scene.add(model)
+    scene.note_losses()
+    parent, mapping = posixpath.dirname(name), Mapping()
+    beside = [folder.name_from(parent, other) for other in side_files(given.path)]
+    classes, rooms = (folder.read(other, max_bytes=_MOST_JSON_BYTES) for other in beside)
+    if classes is not None:
+        mapping = mapping_from_json(classes, beside[0])
+    source = Source("robot", given.path.name, folder.sha256)
+    return house_of_gltf(
+        scene.built.gltf(), source, given.path.stem, fields, notes,
+        mapping=mapping, fetch=scene.built.fetch, rooms=rooms,
+    )  # fmt: skip
+
+
+def companions_of_robot(given: GivenFile, files: SourceFiles) -> str:
+    """Digest of all other files that the reader opens; "" if there are none."""
+    try:
+        folder, name = root_of(given)
+        parent = posixpath.dirname(name)
+        names = {folder.name_from(parent, other) for other in side_files(given.path)}
+        for model in _models(folder, name, Notes(name, strict=False)):
+            visuals = {v.file for link in model.robot.links for v in link.visuals if v.file}
+            for model_file in {model_name(v, folder, model.folder) for v in visuals}:
+                if model_file.lower().endswith(_MODELS) and folder.path(model_file) is not None:
+                    names |= files_of_asset(folder, model_file, files)
+        names |= set(folder.names_read) - {name}
+    except (BadHouse, OSError):
+        return ""
+    return files.digest(folder, names)
+
+
+def _models(folder: RootFolder, name: str, notes: Notes) -> list[SdfModel]:
+    """The models of a world; a URDF is one model without a name."""
+    data = folder.read(name, max_bytes=MAX_BYTES)
+    if data is None:
+        raise BadHouse(name, "", "no such file")
+    if b"<sdf" in data:
+        return list(models_of_sdf(folder, name, notes))
+    robot = robot_from_urdf(data, name)
+    return [SdfModel("", np.eye(4), robot, (), posixpath.dirname(name))]
+
+
+class _Scene:
+    """The glTF scene of a home; state: the models added so far, and the counts of what is missing."""
+
+    def __init__(self, built: Assembly, notes: Notes) -> None:
+        self.built = built
+        self._notes = notes
+        self._missing: set[str] = set()
+        self._foreign: set[str] = set()  # models in formats that are not read
+        self._n_unread = 0
+
+    def add(self, model: SdfModel) -> None:
+        """Place a model, each of its items a node with the item's name."""
+        robot = model.robot
+        self._n_unread += robot.n_unread
+        node_of = placed_links(self.built, robot, self._roots_of(model.folder), {}, 1.0)
+        nodes = self.built.document["nodes"]
+        for light in model.lights:
+            bulb = {"type": "point", "color": list(light.rgb), "extras": {"assumed": True}}
+            node = self.built.light_node(bulb, light.link_from_light[:3, 3], "")
+            if light.link in node_of:
+                nodes[node_of[light.link]]["children"].append(node)
+            else:
+                self.built.roots.append(self._turned([node], model.world_from_model))
+        if not node_of:
+            return
+        self._name_items(robot, model.name, node_of)
+        roots = roots_of_robot(robot, node_of)
+        self.built.roots.append(self._turned(roots, model.world_from_model))
+
+    def note_losses(self) -> None:
+        """Note the models that are missing or in other formats, and the shapes that are not read."""
+        for kind, names, text in (
+            ("missing-model", self._missing, "are not here"),
+            (UNREAD, self._foreign, f"are not read; models are {', '.join(_MODELS)}"),
+        ):
+            if names:
+                first = ", ".join(sorted(names)[:3])
+                self._notes.add(kind, "visual", f"{len(names)} models {text}: {first[:150]}")
+        if self._n_unread:
+            self._notes.add(UNREAD, "visual", f"{self._n_unread} shapes are not read")
+
+    def _roots_of(self, at: str) -> Callable[[str], list[int] | None]:
+        def roots_of(reference: str) -> list[int] | None:
+            try:
+                name = model_name(reference, self.built.folder, at)
+                if not name.lower().endswith(_MODELS):
+                    self._foreign.add(name)
+                    return None
+                added = self.built.asset(name)
+            except BadHouse as error:
+                text = f"{error.message[:200]}; it is left out"
+                self._notes.add("unreadable-model", reference[:100], text)
+                return None
+            if added is None:
+                self._missing.add(name)
+            return added and added[0]
+
+        return roots_of
+
+    def _turned(self, roots: list[int], world_from_model: F64) -> int:
+        matrix = _Y_UP @ world_from_model
+        nodes = self.built.document["nodes"]
+        nodes.append({"name": "", "matrix": matrix.T.ravel().tolist(), "children": roots})
+        return len(nodes) - 1
+
+    def _name_items(self, robot: Robot, model: str, node_of: dict[str, int]) -> None:
+        """Make items of the uppermost links with a shape or a moving part; the others are groups."""
+        below: dict[str | None, list[Link]] = {}
+        for link in robot.links:
+            below.setdefault(link.parent, []).append(link)
+        waiting = list(below.get(None, []))
+        while waiting:
+            link = waiting.pop()
+            parts = below.get(link.name, [])
+            moves = any(part.joint and part.joint.kind is not None for part in parts)
+            if not link.visuals and not moves:
+                waiting += parts
+                continue
+            name = model or link.name
+            files = [posixpath.basename(v.file).rpartition(".")[0] for v in link.visuals]
+            words = [name, *(part.name for part in parts), *files]
+            classified = next((w for w in words if class_of_node_name(w) is not None), name)
+            node: dict[str, Any] = self.built.document["nodes"][node_of[link.name]]
+            node["name"] = classified
+            node["extras"] |= {"one": True, "by_name": True, "item": name, "name": name}
