@@ -8,7 +8,7 @@ HOME_NAME ?= Studio
 # Processes of ours find their modules compiled: without that each takes a second of CPU more.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup demo lint check check-fast test test-all test-long test-oldest test-newest test-farm test-infra test-kube test-slow test-web test-sweethome3d test-study test-manual test-notebooks test-cuda gpu-check bench bench-all bench-cycles bench-farm dist image docs format clean
+.PHONY: help setup demo lint check check-fast test test-all test-long test-oldest test-newest test-farm test-infra test-kube test-slow fuzz test-web test-sweethome3d test-study test-manual test-notebooks test-cuda gpu-check bench bench-all bench-cycles bench-farm dist image docs format clean
 
 # Markers of the tests that need more than a CPU and the packages of `make setup` and `make test-all`.
 APART := not gpu and not infra and not kube and not sweethome3d and not notebooks and not pages
@@ -95,6 +95,10 @@ test-slow: setup ## the tests that take minutes
 	@$(example-homes)
 	$(BIN)/pytest -m slow
 
+fuzz: setup ## coverage-guided fuzzing of six readers of binary files, five minutes each: findings in out/fuzz; NAME=glb SECONDS=60 for one
+	@$(BIN)/python -c "import atheris" 2>/dev/null || $(BIN)/pip install -q atheris
+	set -e; for name in $(or $(NAME),glb zip java ply ifc mjcf); do PYTHONPATH=. $(BIN)/python scripts/fuzz.py $$name $(or $(SECONDS),300); done
+
 test-farm: export PBRS_SETUP_ALSO := faketime
 test-farm: setup ## the farm's tests that really kill processes
 	$(BIN)/pytest -n 4 -m chaos
@@ -161,6 +165,7 @@ dist: setup ## sdist and wheel into dist/, dated as the last commit: a second bu
 	@$(call extra,build twine cyclonedx_py,release)
 	rm -rf dist
 	SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct) $(BIN)/python -m build
+	SOURCE_DATE_EPOCH=$$(git log -1 --format=%ct) $(BIN)/python -m build --outdir dist deploy/weights
 	$(BIN)/python -m twine check --strict dist/*
 
 image: setup ## the Docker image (TARGET=gpu for the other): version from git, base by digest, SBOM in out/image

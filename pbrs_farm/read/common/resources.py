@@ -51,7 +51,7 @@ class ZipResources:
         total = sum(e.file_size for e in entries)
         if total > MAX_TOTAL_BYTES:
             raise BadHouse(file, "", f"unpacks to {total} bytes, at most {MAX_TOTAL_BYTES}")
-        self._entries = {e.filename: e for e in entries if not e.is_dir()}
+        self._entries = {e.filename: e for e in entries if not e.filename.endswith("/")}
 
     def _check(self, entry: zipfile.ZipInfo) -> None:
         name = entry.filename

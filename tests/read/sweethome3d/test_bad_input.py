@@ -85,6 +85,18 @@ def test_names_that_leave_the_archive_are_refused() -> None:
         refused(sh3d(home_xml(FULL), {name: b"x"}), "leaves the archive")
 
 
+def test_an_entry_without_a_name_is_ignored() -> None:
+    sound = sh3d(home_xml(WALLS), {"1": BOX_OBJ})
+    stream = io.BytesIO(sound)
+    nameless = zipfile.ZipInfo("x")
+    nameless.filename = ""
+    with zipfile.ZipFile(stream, "a") as archive:
+        archive.writestr(nameless, b"")
+    assert len(read_home(stream.getvalue(), "home.sh3d").rooms) == len(
+        read_home(sound, "home.sh3d").rooms
+    )
+
+
 def test_a_zip_bomb_is_refused_without_unpacking_it() -> None:
     stream = io.BytesIO()
     with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
