@@ -28,8 +28,14 @@ _VAGUE: Final = {
 }
 # Classes with members of other common names: class -> word in the item's name -> noun.
 _OWN_WORDS: Final = {
-    "chair": {word: word for word in ("bench", "stool", "ottoman", "pouf")},
+    "bag": {word: word for word in ("suitcase", "backpack")},
+    "bed": {word: word for word in ("crib", "duvet", "mattress")},
+    "box": {word: word for word in ("basket", "crate")},
+    "cabinet": {"wardrobe": "wardrobe"},
+    "chair": {word: word for word in ("armchair", "bench", "stool", "ottoman", "pouf")},
     "curtain": {"curtains": "set of curtains"},
+    "lamp": {word: word for word in ("candle", "candlestick")},
+    "television": {"monitor": "monitor"},
 }
 _NOUNS_OF_KINDS: Final = {"plant": "plant", "stairs": "staircase", "person": "person"}
 _PLAIN_NAME: Final = re.compile(r"[A-Za-z]{2,12}(?: [A-Za-z]{2,12})?")

@@ -15,7 +15,7 @@ import pytest
 
 import pbrs_farm as pf
 from pbrs_farm.core.house import House, Item, MaterialKind
-from pbrs_farm.export.chosen_view import ChosenView
+from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.export_views import export, remarks_of
 from pbrs_farm.export.nouns import noun_of
 from pbrs_farm.export.questions import asking, clips
@@ -51,7 +51,9 @@ def clip_of(*things: Thing, frames: int = 1, eye=(1.0, 1.5, 1.0), facts: Any = N
     table = {"world_from_camera_opencv": pose.tolist(), "instances": [], "width_px": 100} | (
         facts or {}
     )
-    view = SimpleNamespace(facts=table, entry=SimpleNamespace(file=lambda _name: None))
+    view = SimpleNamespace(
+        facts=table, entry=SimpleNamespace(file=lambda _name: None), choice=Choice()
+    )
     house = house_of(*(t.item for t in things))
     return Clip("clip", [cast(ChosenView, view)] * frames, house, things)
 
@@ -288,16 +290,44 @@ def test_a_relative_accuracy_is_the_share_of_thresholds_passed():
 
 def test_a_phrase_fits_exactly_one_item():
     rows = [
-        {"id": k, "box2d": [x, 0, x + 10, 10]} for k, x in ((1, 5), (2, 60), (3, 30), (4, 80))
+        {"id": k, "box2d": [x, 0, x + 24, 24]} for k, x in ((1, 5), (2, 60), (3, 30), (4, 80))
     ]  # fmt: skip
-    table, stool = visible_item(3, "table", 4, 4, (1.5, 0.7, 1.5)), visible_item(4, "stool", 7, 7)
+    table, sofa = visible_item(3, "table", 4, 4, (1.5, 0.7, 1.5)), visible_item(4, "sofa", 7, 7)
     on_table = visible_item(2, "vase", 4, 4, (0.2, 0.3, 0.2), y=0.7)
-    clip = clip_of(visible_item(1, "vase", 1, 1), on_table, table, stool, facts={"instances": rows})
+    clip = clip_of(visible_item(1, "vase", 1, 1), on_table, table, sofa, facts={"instances": rows})
     phrases = {r.phrase: r.instance for r in references_of(clip)}
     assert phrases == {
         "the vase on the left": 1, "the vase on the right": 2, "the vase on the table": 2,
-        "the table": 3, "the stool": 4,
+        "the table": 3, "the sofa": 4,
     }  # fmt: skip
+
+
+@pytest.mark.parametrize(
+    ("noun", "side_px", "seen", "neighbour"),
+    [
+        ("vase", 23, {}, None), ("vase", 24, {"most_visible": 0.5}, None), ("ornament", 24, {}, None),
+        ("vase", 24, {"first_seen": None}, None), ("vase", 24, {}, ("bin", 5)), ("cabinet", 24, {}, ("cabinet", 1.52)),
+    ],
+)  # fmt: skip
+def test_no_phrase_names_an_item_that_a_person_cannot_recognize(noun, side_px, seen, neighbour):
+    def phrased(noun: str, side_px: int, others: list[Thing], **seen: Any) -> set[int]:
+        items = [visible_item(1, noun, 1, 1, **seen), *others]
+        rows = [
+            {"id": t.instance, "box2d": [0, 0, side_px + 60 * k, 70]} for k, t in enumerate(items)
+        ]
+        clip = clip_of(*items, facts={"instances": rows, "width_px": 200})
+        return {reference.instance for reference in references_of(clip)}
+
+    others = [] if neighbour is None else [visible_item(2, neighbour[0], neighbour[1], 1)]
+    assert not phrased(noun, side_px, others, **seen)
+    assert phrased("vase", 24, [visible_item(2, "sofa", 5, 1)]) == {1, 2}
+    assert phrased("cabinet", 24, [visible_item(2, "cabinet", 5, 1)]) == {1, 2}
+
+
+def test_a_basket_is_no_box_and_a_candle_no_lamp():
+    for kind, name, noun in (("box", "Shopping basket", "basket"), ("lamp", "Candle 2", "candle")):
+        row = {"class": kind, "kind": "object", "name": name}
+        assert noun_of(view_of_wall(0), row) == noun
 
 
 @pytest.mark.parametrize(
@@ -308,14 +338,14 @@ def test_a_phrase_fits_exactly_one_item():
     ],
 )  # fmt: skip
 def test_a_phrase_names_the_colour_of_a_coloured_item(kind, rgb, colour):
-    row = {"id": 1, "box2d": [0, 0, 10, 10]}
+    row = {"id": 1, "box2d": [0, 0, 30, 30]}
     clip = clip_of(visible_item(1, "cabinet", 1, 1), facts={"instances": [row]})
     layers = {
         "instance": np.ones((10, 10), np.uint16),
         "albedo": np.full((10, 10, 3), rgb, np.uint8),
     }
     view = SimpleNamespace(
-        facts=clip.views[0].facts, array=layers.__getitem__,
+        facts=clip.views[0].facts, array=layers.__getitem__, choice=Choice(),
         entry=SimpleNamespace(file=lambda name: name if name == "albedo.png" else None),
     )  # fmt: skip
     house = replace(clip.house, materials=[replace(m, kind=kind) for m in clip.house.materials])

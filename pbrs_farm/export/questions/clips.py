@@ -8,7 +8,8 @@ from __future__ import annotations
 from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cache, cached_property
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -18,6 +19,7 @@ from scipy.spatial import cKDTree
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, Room
+from pbrs_farm.core.record import read_csv
 from pbrs_farm.export.chosen_view import ChosenView, intrinsics_of
 from pbrs_farm.export.export_homes import stored_house
 from pbrs_farm.export.nouns import is_plural, noun_of
@@ -140,6 +142,10 @@ class Clip:
         alone = (things[0] for things in self.by_noun.values() if len(things) == 1)
         return [thing for thing in alone if names[thing.item.name] == 1]
 
+    def has_look_alike(self, noun: str) -> bool:
+        """True if a noticeable item of another noun has a similar shape."""
+        return any(thing.noun in look_alikes().get(noun, ()) for thing in self.things)
+
     @cached_property
     def footprints(self) -> dict[str, list[tuple[Item, Any]]]:
         """Room id -> obstacles of a walker, between the floor and head height, with their plans."""
@@ -203,6 +209,29 @@ class Clip:
         if key not in self._gaps:
             self._gaps[key] = _gap_m(a, b)
         return self._gaps[key]
+
+
+@dataclass(frozen=True, slots=True)
+class _Shape:
+    """shape: what the nouns have in common. nouns: separated by |."""
+
+    shape: str
+    nouns: str
+
+
+@cache
+def look_alikes() -> dict[str, set[str]]:
+    """Recognizable noun -> the other nouns with a similar shape, from look_alikes.csv.
+
+    >>> "jar" in look_alikes()["vase"], "ornament" in look_alikes()
+    (True, False)
+    """
+    others: dict[str, set[str]] = defaultdict(set)
+    for row in read_csv(Path(__file__).with_name("look_alikes.csv"), _Shape):
+        group = row.nouns.split("|")
+        for noun in group:
+            others[noun].update(set(group) - {noun})
+    return dict(others)
 
 
 def is_countable(noun: str) -> bool:

@@ -30,14 +30,6 @@ _MARGIN_DEG: Final = 15.0  # minimum angle between a direction and the boundary 
 _LATER_FRAMES: Final = (
     5  # minimum frames from the first view of an item to the first pixel of the next
 )
-# Nouns that some people would count together.
-_LOOK_ALIKE: Final = (
-    frozenset({"bookshelf", "set of shelves"}),
-    frozenset({"table", "desk", "counter"}),
-    frozenset({"cabinet", "dresser", "nightstand"}),
-    frozenset({"chair", "stool", "bench"}),
-    frozenset({"bag", "basket", "box"}),
-)
 # Nouns with an ambiguous extent: a sink's bowl or its cabinet, one curtain or both.
 _UNMEASURED: Final = frozenset({"sink", "curtain", "set of curtains"})
 _SIDES: Final = ("left", "right")
@@ -92,10 +84,8 @@ def _tried(
 
 def _counts(clip: Clip, _rng: random.Random) -> Iterator[Draft]:
     """Number of items of a noun, at least two, unless the clip has look-alikes of another noun."""
-    nouns = {thing.noun for thing in clip.things}
     for noun, same in clip.by_noun.items():
-        is_alike = any(noun in group and len(group & nouns) > 1 for group in _LOOK_ALIKE)
-        if len(same) > 1 and not is_alike:
+        if len(same) > 1 and not clip.has_look_alike(noun):
             yield Draft({"many": plural(noun)}, str(len(same)), (), tuple(t.instance for t in same))
 
 

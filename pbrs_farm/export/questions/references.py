@@ -20,7 +20,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.gloss import coat_of
 from pbrs_farm.core.house import Material, MaterialKind
 from pbrs_farm.core.mesh import face_areas, triangle_corners
-from pbrs_farm.export.questions.clips import Clip, Thing, is_countable
+from pbrs_farm.export.questions.clips import Clip, Thing, is_countable, look_alikes
 
 _APART: Final = 0.05  # minimum horizontal distance between centres of items side by side, share of the picture's width
 _NEARER_M: Final = 0.3
@@ -31,6 +31,9 @@ _COLOURS_APART: Final = 60.0  # of 255, minimum distance between the mean colour
 _OF_NO_COLOUR: Final = (
     0.3  # minimum share of metal, mirror or glass in the surface of an item without a colour
 )
+_RECOGNIZED: Final = 0.6  # minimum visible share of an item with a phrase
+_LEAST_SIDE_PX: Final = 24  # minimum width and height of its box in the picture
+_TOUCHING_M: Final = 0.03  # gap in plan between items whose border is hard to see
 _ORDINALS: Final = ("first", "second", "third", "fourth", "fifth", "sixth")
 
 
@@ -68,6 +71,27 @@ class _Picture:
         if self.view.entry.file("albedo.png") is None:
             return None
         return _colour_words(self.view.array("albedo")[..., :3])
+
+    def is_recognizable(self, thing: Thing) -> bool:
+        """True if a person sees what the item is, and where it ends.
+
+        Its noun has a familiar shape, and no noticeable item of another noun has a similar one; it is large
+        and mostly visible, and does not touch an item of its noun. All of a user's classes are familiar.
+        """
+        if self.view.choice.classes is None and thing.noun not in look_alikes():
+            return False
+        x0, y0, x1, y1 = self.rows[thing.instance]["box2d"]
+        is_clear = thing.first_seen is not None and thing.most_visible >= _RECOGNIZED
+        return (
+            is_clear
+            and min(x1 - x0, y1 - y0) >= _LEAST_SIDE_PX
+            and not self.clip.has_look_alike(thing.noun)
+            and not any(
+                other.noun == thing.noun and other.plan.distance(thing.plan) < _TOUCHING_M
+                for other in self.clip.things
+                if other is not thing
+            )
+        )
 
     def column(self, thing: Thing) -> float:
         """Centre of an item's box in the picture, as a share of the width."""
@@ -157,7 +181,8 @@ def references_of(clip: Clip) -> list[Reference]:
     """Phrases for the clearly visible items of a picture, each true of one item only.
 
     By noun if it is unique, by colour, by side and order, by support, and by distance from the camera.
-    Hardly visible items of the same noun are considered: a phrase must not fit any of them.
+    Hardly visible items of the same noun are considered: a phrase must not fit any of them. Only items that
+    a person recognizes have phrases.
     """
     picture = _Picture(clip)
     groups: dict[str, list[Thing]] = {}
@@ -169,7 +194,7 @@ def references_of(clip: Clip) -> list[Reference]:
         if not is_countable(noun):
             continue
         for phrase, thing in _phrases(picture, noun, things, singles):
-            if thing.first_seen is not None:
+            if picture.is_recognizable(thing):
                 references.append(Reference(phrase, thing.instance))
     return references
 
