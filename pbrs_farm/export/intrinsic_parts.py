@@ -1,4 +1,4 @@
-"""Albedo, shading and residual of a view for forms that hold no negative residual. Effects: reads the view."""
+"""Albedo, shading and residual of a view for other tools. Effects: reads the view."""
 
 from __future__ import annotations
 
@@ -10,12 +10,10 @@ from pbrs_farm.core.lighting import GROUPS_OF_MODE, Group, Mode
 from pbrs_farm.export.chosen_view import ChosenView
 
 
-def intrinsic_parts(view: ChosenView) -> tuple[F32, F32, F32] | None:
-    """(albedo, shading, residual), (H, W, 3) float32 linear, none of them negative; None without the layers.
+def intrinsic_layers(view: ChosenView) -> tuple[F32, F32, F32] | None:
+    """(albedo, shading, residual) of the picture's light, (H, W, 3) float32 linear; None without the layers.
 
-    The decomposition of the picture's radiance: albedo x shading + residual. If albedo x shading alone
-    would exceed it (a coat at a slant, an edge within the pixel), shading is reduced: Marigold's
-    preparation of Hypersim refuses frames with a negative residual.
+    The radiance is albedo x shading + residual; the residual may be negative.
     """
     groups = GROUPS_OF_MODE[Mode(view.picture)] if view.picture else ()
     ending = "_outdoor" if groups == (Group.OUTDOOR,) else ""
@@ -24,5 +22,18 @@ def intrinsic_parts(view: ChosenView) -> tuple[F32, F32, F32] | None:
         return None
     albedo = linear_from_srgb(view.array(names[0]) / 255).astype(np.float32)
     shading, residual = (np.asarray(view.array(name), np.float32) for name in names[1:])
+    return albedo, shading, residual
+
+
+def parts_without_negatives(view: ChosenView) -> tuple[F32, F32, F32] | None:
+    """The layers of `intrinsic_layers` with the same sum, none of them negative.
+
+    If albedo x shading alone would exceed the radiance (a coat at a slant, an edge within the pixel),
+    shading is reduced: Marigold's preparation of Hypersim refuses frames with a negative residual.
+    """
+    layers = intrinsic_layers(view)
+    if layers is None:
+        return None
+    albedo, shading, residual = layers
     over = np.divide(residual, albedo, out=np.zeros_like(residual), where=albedo > 0)
     return albedo, np.maximum(shading + np.minimum(over, 0), 0), np.maximum(residual, 0)

@@ -29,7 +29,7 @@ from pbrs_farm.export.chosen_view import (
     require_lens,
 )
 from pbrs_farm.export.form import Convention, ViewForm
-from pbrs_farm.export.intrinsic_parts import intrinsic_parts
+from pbrs_farm.export.intrinsic_parts import parts_without_negatives
 from pbrs_farm.export.sequences import pose_opencv
 from pbrs_farm.formats import hypersim
 from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
@@ -240,12 +240,12 @@ def _in_world(local: F32, pose: F64, turn: F64) -> F32:
 def light_layers(view: ChosenView) -> dict[str, NDArray[np.float16]]:
     """color and the available intrinsic layers; with all of them, color == reflectance x illumination + residual.
 
-    No residual is negative (`intrinsic_parts`).
+    No residual is negative (`parts_without_negatives`).
     """
     light_arrays: dict[str, NDArray[np.float16]] = {}
     if view.has("albedo"):
         light_arrays["diffuse_reflectance"] = _half(linear_from_srgb(view.array("albedo") / 255))
-    parts = intrinsic_parts(view)
+    parts = parts_without_negatives(view)
     if parts is not None:
         names = "diffuse_reflectance", "diffuse_illumination", "residual"
         light_arrays |= {name: _half(part) for name, part in zip(names, parts, strict=True)}

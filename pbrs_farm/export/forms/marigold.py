@@ -18,6 +18,7 @@ from typing import Final
 
 import numpy as np
 
+from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.chosen_view import (
     Choice,
@@ -26,8 +27,8 @@ from pbrs_farm.export.chosen_view import (
     opengl_normals,
     require_lens,
 )
-from pbrs_farm.export.form import Convention, ViewForm, name_left_out
-from pbrs_farm.export.intrinsic_parts import intrinsic_parts
+from pbrs_farm.export.form import REMARKS, Convention, ViewForm, name_left_out
+from pbrs_farm.export.intrinsic_parts import intrinsic_layers
 from pbrs_farm.images import exr_from_layers, png_from_array
 
 _LISTS: Final = {
@@ -45,10 +46,11 @@ def write_marigold(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     0 = nothing or 65.535 m and more. Normals are float32 (H, W, 3), unit, x right, y up, z towards the
     camera, 0 for nothing; a view without `normal` is in the list of depth alone. A view with `albedo`,
     `shading` and `residual` is a sample of light, like Marigold's of Hypersim: float32 (H, W, 3), linear,
-    not negative. One with `albedo`, `roughness` and `metallic` is a sample of materials, like Marigold's of
+    as the layers are; remarks.txt counts pixels with a negative residual, which its loader clips to 0. One with `albedo`, `roughness` and `metallic` is a sample of materials, like Marigold's of
     InteriorVerse. left_out.txt names views without a picture; BadInput if no view has one.
     """
     lines: dict[str, list[str]] = {name: [] for name in _LISTS}
+    n_negative = n_pixels = 0
     shown = [view for view in views if view.picture is not None]
     if not shown:
         raise BadInput("--to marigold", "", "no view has a picture", hint="run with --modes")
@@ -64,24 +66,30 @@ def write_marigold(views: list[ChosenView], out: Path, _choice: Choice) -> None:
             normal = f"{view.house.id}/normal_{view.id}.npy"
             np.save(out / normal, opengl_normals(view))
             lines["normal"].append(f"{rgb} {normal}\n")
-        for name, write in (("lighting", _write_lighting), ("appearance", _write_appearance)):
-            files = write(view, out)
-            if files:
-                lines[name].append(f"{' '.join((rgb, *files))}\n")
+        light = intrinsic_layers(view)
+        if light is not None:
+            lines["lighting"].append(f"{' '.join((rgb, *_write_lighting(view, light, out)))}\n")
+            is_negative = (light[2] < 0).any(-1)
+            n_negative, n_pixels = n_negative + int(is_negative.sum()), n_pixels + is_negative.size
+        files = _write_appearance(view, out)
+        if files:
+            lines["appearance"].append(f"{' '.join((rgb, *files))}\n")
     for name, samples in lines.items():
         if samples:
             (out / f"{_LISTS[name]}.txt").write_text("".join(samples), "utf-8")
+    if n_negative:
+        (out / REMARKS).write_text(
+            f"residual: negative at {n_negative} of {n_pixels} pixels ({n_negative / n_pixels:.0%}), where a coat"
+            " keeps light from the colour below it, and at edges; Marigold's loader clips it to 0\n"
+        )
     without = [view for view in views if view.picture is None]
     name_left_out(out, without, "has no picture")
 
 
-def _write_lighting(view: ChosenView, out: Path) -> list[str]:
-    """Write albedo, shading and residual; returns their paths, [] for a view without them."""
-    parts = intrinsic_parts(view)
-    if parts is None:
-        return []
+def _write_lighting(view: ChosenView, light: tuple[F32, F32, F32], out: Path) -> list[str]:
+    """Write albedo, shading and residual; returns their paths."""
     files = [f"{view.house.id}/{n}_{view.id}.npy" for n in ("albedo", "shading", "residual")]
-    for file, part in zip(files, parts, strict=True):
+    for file, part in zip(files, light, strict=True):
         np.save(out / file, part)
     return files
 
@@ -120,8 +128,8 @@ FORM = ViewForm(
     "`<house>/rgb_<view>.png`, `depth_<view>.png` (uint16 mm), `normal_<view>.npy` (float32, x right, y up,"
     " z towards the camera) and lists of them, `filename_list.txt` (`rgb depth`) and"
     " `filename_list_normals.txt` (`rgb normal`); of views with `albedo`, `shading`, `residual` `filename_list_iid_lighting.txt`"
-    " (`rgb albedo shading residual`, float32 npy, linear), with `albedo`, `roughness`, `metallic` `filename_list_iid_appearance.txt`"
-    " (`rgb albedo material mask`, sRGB PNG, EXR of roughness and metallic, PNG without glass and mirrors); with `--split` `train/filename_list_train.txt` and so on",
+    " (`rgb albedo shading residual`, the layers as float32 npy, linear; Marigold's loader clips negative residual), with `albedo`, `roughness`, `metallic` `filename_list_iid_appearance.txt`"
+    " (`rgb albedo material mask`, sRGB PNG, EXR of roughness and metallic, PNG without glass and mirrors); with `--split` `train/filename_list_train.txt`",
     finish=name_lists_by_split,
     lenses=("pinhole", "radtan"),
     convention=Convention(

@@ -36,7 +36,7 @@ FORM = ViewForm(
     "yolo-seg",
     write_yolo_seg,
     "as `yolo`; a line has the polygon of an item's mask, with an IoU of 0.97 or more; it goes to"
-    " each hole and further part, around it and back, as Ultralytics joins polygons",
+    " each hole and further part, around it and back",
     has_classes=True,
     finish=write_data_yaml,
     convention=Convention(0.5, has_k=False, axes="shares of the picture, from its corner"),
