@@ -195,6 +195,14 @@ def conventions_table() -> str:
     return "\n".join(rows)
 
 
+def views_with_picture(views: list[ChosenView]) -> list[ChosenView]:
+    """The views that have a picture; BadInput if none has."""
+    shown = [view for view in views if view.picture is not None]
+    if not shown:
+        raise BadInput("--to", "", "no view has a picture", hint="run with --modes")
+    return shown
+
+
 def name_left_out(out: Path, views: list[ChosenView], why: str) -> None:
     """Write left_out.txt, `<house>/<view>: <why>` a line, unless there are no views.
 

@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.classes import NYU40_COLOURS
 from pbrs_farm.export.chosen_view import Choice, ChosenView, camera_facts
-from pbrs_farm.export.form import Convention, ViewForm
+from pbrs_farm.export.form import Convention, ViewForm, views_with_picture
 from pbrs_farm.export.masks import compressed_runs
 from pbrs_farm.images import png_from_array
 
@@ -27,6 +27,7 @@ def write_coco(views: list[ChosenView], out: Path, choice: Choice) -> None:
     lengths (as pycocotools reads them), iscrowd 0. Additional fields: house, view, K, lens and
     depth (where no pin-hole), world_from_camera_opencv, instance_id, visible_fraction, truncated.
     """
+    views_with_picture(views)
     images: list[dict[str, Any]] = []
     annotations: list[dict[str, Any]] = []
     for number, view in enumerate(views, start=1):

@@ -19,7 +19,6 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.arrays import F32
-from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.chosen_view import (
     Choice,
     ChosenView,
@@ -27,7 +26,7 @@ from pbrs_farm.export.chosen_view import (
     opengl_normals,
     require_lens,
 )
-from pbrs_farm.export.form import REMARKS, Convention, ViewForm, name_left_out
+from pbrs_farm.export.form import REMARKS, Convention, ViewForm, name_left_out, views_with_picture
 from pbrs_farm.export.intrinsic_parts import intrinsic_layers
 from pbrs_farm.images import exr_from_layers, png_from_array
 
@@ -51,10 +50,7 @@ def write_marigold(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     """
     lines: dict[str, list[str]] = {name: [] for name in _LISTS}
     n_negative = n_pixels = 0
-    shown = [view for view in views if view.picture is not None]
-    if not shown:
-        raise BadInput("--to marigold", "", "no view has a picture", hint="run with --modes")
-    for view in shown:
+    for view in views_with_picture(views):
         require_lens(view, "marigold", *FORM.lenses)
         (out / view.house.id).mkdir(exist_ok=True)
         rgb = f"{view.house.id}/rgb_{view.id}.png"

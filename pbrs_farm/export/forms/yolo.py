@@ -10,7 +10,7 @@ from typing import Any, Final
 from pbrs_farm.core.classes import CEILING, FLOOR, WALL
 from pbrs_farm.core.house_split import SPLITS
 from pbrs_farm.export.chosen_view import Choice, ChosenView
-from pbrs_farm.export.form import Convention, ViewForm, name_left_out
+from pbrs_farm.export.form import Convention, ViewForm, name_left_out, views_with_picture
 
 # classes without boxes: they surround the picture
 _NO_BOX: Final = (0, WALL, FLOOR, CEILING)
@@ -48,7 +48,7 @@ def write_pictures_beside(
     label_of: the suffix and the bytes of a view's label. Views without a picture are left out, and
     named in left_out.txt.
     """
-    shown = [view for view in views if view.picture is not None]
+    shown = views_with_picture(views)
     for name in ("images", folder):
         (out / name).mkdir()
     for view in shown:
