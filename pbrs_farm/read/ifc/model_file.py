@@ -48,6 +48,7 @@ def model_of(path: Path) -> Any:
     if model is None or not model.by_type("IfcProject"):
         raise BadHouse(path, "", "has no IfcProject", hint="export the whole model again")
     _mend_names(model)
+    _remove_broken_relations(model)
     return model
 
 
@@ -145,3 +146,18 @@ def _mend_names(model: Any) -> None:
             for name in _NAMED:
                 if getattr(row, name, "") is None:
                     setattr(row, name, None)
+
+
+def _remove_broken_relations(model: Any) -> None:
+    """Remove relations that lack one of their sides, such as an opening without a wall."""
+    from ifcopenshell.ifcopenshell_wrapper import schema_by_name
+
+    schema = schema_by_name(model.schema_identifier)
+    for row in model.by_type("IfcRelationship"):
+        attributes = schema.declaration_by_name(row.is_a()).all_attributes()
+        if any(
+            row[k] is None and not attribute.optional()
+            for k, attribute in enumerate(attributes)
+            if attribute.name().startswith("Relat")
+        ):
+            model.remove(row)

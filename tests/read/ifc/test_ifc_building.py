@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 import zipfile
 from pathlib import Path
 
@@ -253,6 +254,15 @@ def test_a_damaged_file_is_refused_with_its_place(tmp_path: Path, case: str) -> 
     with pytest.raises(BadHouse, match=text) as caught:
         read_house(resolve(str(path)), ReadFields())
     assert "\n" not in str(caught.value)
+
+
+def test_relations_that_lack_a_side_are_ignored(tmp_path: Path) -> None:
+    path = tmp_path / "a.ifc"
+    pattern = r"(IFCREL(?:VOIDS|FILLS)ELEMENT\('[^']*',[^,]*,[^,]*,[^,]*,)#\d+"
+    text, n_broken = re.subn(pattern, r"\1$", two_rooms().text())
+    assert n_broken >= 2
+    path.write_text(text)
+    assert kinds(read_house(resolve(str(path)), ReadFields()))["wall"] >= 4
 
 
 def test_a_chair_of_millions_of_triangles_is_refused(tmp_path: Path) -> None:
