@@ -39,7 +39,8 @@ _HANDLE_M: Final = 1.05  # above the floor
 LEAVES: Final = ("four", "flat", "two", "six", "one", "boards", "three", "five")
 """Designs of a door's leaf, by its panels."""
 
-HANDLES: Final = ("lever", "knob", "plate", "bar")
+HANDLES: Final = ("lever", "knob", "plate", "bar", "rose", "pull")
+"""Of doors, catches of windows alike; a rose has a keyhole below its lever, a pull a bow on a plate."""
 
 # fmt: off
 SASHES: Final = (
@@ -51,14 +52,18 @@ SASHES: Final = (
 a cross, a fine grid, two bars, an upright one, panes in the light on top, a grid in the upper half."""
 
 _GRIDS: Final = {
-    "rail": (2, 1),
-    "grid": (3, 2),
-    "cross": (2, 2),
-    "lattice": (4, 3),
-    "thirds": (3, 1),
-    "mullion": (1, 2),
+    "rail": (0.65, 9.0),
+    "grid": (0.42, 0.36),
+    "cross": (0.6, 0.45),
+    "lattice": (0.3, 0.26),
+    "thirds": (0.45, 9.0),
+    "mullion": (9.0, 0.4),
 }
-"""Rows and columns of panes of a sash."""
+"""Height and width of the panes of a sash, about, metres: larger sashes have more."""
+
+_KICKED: Final = frozenset({"grid", "cross", "thirds", "small_top", "sash_grid", "rail"})
+"""Designs whose French windows have a panel of wood below."""
+_KICK_M: Final = 0.45  # its height with the bar above it
 
 _Box = tuple[Triple, Triple]  # low and high corner
 
@@ -72,6 +77,7 @@ class OpeningDesign:
     handle: str = HANDLES[0]
     sash: str = SASHES[0]
     colour: Triple = (0.93, 0.92, 0.90)  # sRGB of their wood
+    has_vents: bool = False  # slotted strips at the heads of windows
 
 
 def drawn_design(
@@ -84,7 +90,7 @@ def drawn_design(
     leaf, entrance, handle, sash = (
         choices[int(rng.integers(len(choices)))] for choices in (leaves, leaves, HANDLES, sashes)
     )
-    return OpeningDesign(leaf, entrance, handle, sash, colour)
+    return OpeningDesign(leaf, entrance, handle, sash, colour, bool(rng.random() < 0.3))
 
 
 def opening_model(opening: PlanOpening, wall_m: float, design: OpeningDesign) -> Shape:
@@ -101,6 +107,8 @@ def opening_model(opening: PlanOpening, wall_m: float, design: OpeningDesign) ->
     frame = _frame_boxes(w, h, d, has_sill=opening.sill > 0)
     if opening.kind is OpeningKind.PASSAGE:
         return Shape((boxes_surface("frame", frame, 0),), (paint,))
+    if opening.sill > 0 and design.has_vents:
+        frame.append(((-0.17, h - 0.04, d / 2), (0.17, h - 0.02, d / 2 + 0.012)))
     if opening.kind in (OpeningKind.DOOR, OpeningKind.ENTRANCE):
         kind = design.leaf if opening.kind is OpeningKind.DOOR else design.entrance
         frame += _stops(w, h, d, has_threshold=opening.kind is OpeningKind.ENTRANCE)
@@ -113,7 +121,8 @@ def opening_model(opening: PlanOpening, wall_m: float, design: OpeningDesign) ->
         moving = [boxes_surface("leaf", leaf, 0), boxes_surface("handle", handles, 1)]
         return _with_joints([boxes_surface("frame", frame, 0)], [(hung, moving)], (paint, metal))
     hung_sashes = []
-    for k, (x, bars, panes, catches) in enumerate(_sashes(w, h, design)):
+    is_french = opening.kind is OpeningKind.FRENCH_WINDOW
+    for k, (x, bars, panes, catches) in enumerate(_sashes(w, h, design, is_french=is_french)):
         # Its catch is at the right of even sashes, the hinges at the other end, in front.
         is_left = k % 2 == 0
         hinge = (x[0] if is_left else x[1], 0.0, _SASH_DEPTH_M)
@@ -223,22 +232,32 @@ def _handles(w: float, d: float, hinge_at_start: bool, kind: str) -> list[_Box]:
             boxes.append(box((u - 0.01, u + 0.01), (y - 0.01, y + 0.01), (0.0, 0.04)))
             boxes.append(box((u - 0.026, u + 0.026), (y - 0.026, y + 0.026), (0.04, 0.065)))
             boxes.append(box((u - 0.03, u + 0.03), (y - 0.03, y + 0.03), (0.0, 0.008)))
-        elif kind == "bar":
+        elif kind in ("bar", "pull"):
+            reach = 0.14 if kind == "bar" else 0.09
+            if kind == "pull":
+                boxes.append(box((u - 0.025, u + 0.025), (y - 0.13, y + 0.13), (0.0, 0.004)))
             boxes += [
                 box((u - 0.008, u + 0.008), (low, low + 0.02), (0.0, 0.045))
-                for low in (y - 0.14, y + 0.12)
+                for low in (y - reach, y + reach - 0.02)
             ]
-            boxes.append(box((u - 0.01, u + 0.01), (y - 0.17, y + 0.17), (0.04, 0.06)))
+            boxes.append(
+                box((u - 0.01, u + 0.01), (y - reach - 0.03, y + reach + 0.03), (0.04, 0.06))
+            )
         else:
             if kind == "plate":
                 boxes.append(box((u - 0.02, u + 0.02), (y - 0.15, y + 0.07), (0.0, 0.006)))
+            if kind == "rose":
+                boxes += [
+                    box((u - 0.025, u + 0.025), (low - 0.025, low + 0.025), (0.0, 0.006))
+                    for low in (y, y - 0.075)
+                ]
             boxes.append(box((u - 0.01, u + 0.01), (y - 0.01, y + 0.01), (0.0, 0.05)))
             boxes.append(box((u, u - side * 0.11), (y - 0.01, y + 0.01), (0.035, 0.05)))
     return boxes
 
 
 def _sashes(
-    w: float, h: float, design: OpeningDesign
+    w: float, h: float, design: OpeningDesign, *, is_french: bool
 ) -> Iterator[tuple[tuple[float, float], list[_Box], list[_Box], list[_Box]]]:
     """(span of x, bars, panes, catches) of sashes side by side, each narrower than a metre.
 
@@ -259,23 +278,40 @@ def _sashes(
         panes: list[_Box] = []
         left, right = -inner / 2 + k * inner / n + 0.002, -inner / 2 + (k + 1) * inner / n - 0.002
         middle = low + share * (high - low)
-        _sash(bars, panes, (left, low, right, middle), lower)
+        sill = low + _KICK_M if is_french and kind in _KICKED else low
+        if sill > low:
+            bars.append(((left, low, -_SASH_DEPTH_M), (right, sill, _SASH_DEPTH_M)))
+            out, x0, x1 = _SASH_DEPTH_M + _PANEL_M, left + 0.07, right - 0.07
+            bars.append(((x0, low + 0.08, -out), (x1, sill - 0.05, out)))
+        _sash(bars, panes, (left, sill, right, middle), lower)
         if share < 1:
             _sash(bars, panes, (left, middle, right, high), upper)
-        catches = _catch(left if k % 2 else right - _SASH_M, (low + middle) / 2, design.handle)
+        x = left if k % 2 else right - _SASH_M
+        catches = _catch(x, (low + middle) / 2, (low, high), design.handle)
+        hinge, z = (right - 0.016 if k % 2 else left), _SASH_DEPTH_M
+        ys = np.linspace(low + 0.15, middle - 0.23, 3 if middle - low > 1.3 else 2).tolist()
+        catches += [((hinge, y, z), (hinge + 0.016, y + 0.08, z + 0.012)) for y in ys]
         yield (left, right), bars, panes, catches
 
 
-def _catch(x: float, y: float, kind: str) -> list[_Box]:
-    """Handle of a sash, on the room side of its upright bar that begins at x."""
+def _catch(x: float, y: float, span: tuple[float, float], kind: str) -> list[_Box]:
+    """Handle of a sash, on the room side of its upright bar that begins at x; span: lowest and highest y."""
     mid, front = x + _SASH_M * 0.4, _SASH_DEPTH_M
     if kind == "knob":
         return [((mid - 0.012, y - 0.012, front), (mid + 0.012, y + 0.012, front + 0.03))]
     rose = ((mid - 0.013, y - 0.03, front), (mid + 0.013, y + 0.03, front + 0.008))
-    if kind == "bar":
+    if kind in ("bar", "pull"):
         return [rose]
     reach = 0.11 if kind == "lever" else 0.075
+    rods: list[_Box] = []
+    if kind == "plate" and span[1] - span[0] > 1.2:  # a bolt as high as the sash, in two guides
+        rods.append(((mid - 0.006, span[0], front), (mid + 0.006, span[1], front + 0.006)))
+        rods += [
+            ((mid - 0.011, g, front), (mid + 0.011, g + 0.03, front + 0.011))
+            for g in (span[0] + 0.1, span[1] - 0.13)
+        ]
     return [
+        *rods,
         rose,
         ((mid - 0.009, y - reach, front + 0.022), (mid + 0.009, y + 0.01, front + 0.036)),
         ((mid - 0.006, y - 0.006, front + 0.008), (mid + 0.006, y + 0.006, front + 0.022)),
@@ -294,7 +330,13 @@ def _sash(
         ((left + t, high - t, -z), (right - t, high, z)),
     ]
     # Bars part the pane into a grid of smaller ones.
-    rows, columns = _GRIDS.get(kind, (1, 1))
+    tall, wide = _GRIDS.get(kind, (np.inf, np.inf))
+    rows, columns = (
+        max(1, round(length / pane))
+        for length, pane in ((high - low - 2 * t, tall), (right - left - 2 * t, wide))
+    )
+    if kind in _GRIDS and rows * columns == 1:
+        rows = 2
     ys = np.linspace(low + t, high - t, rows + 1).tolist()
     xs = np.linspace(left + t, right - t, columns + 1).tolist()
     half, pane, y0, y1 = _BAR_M / 2, _PANE_M / 2, low + t, high - t

@@ -56,6 +56,20 @@ def test_parts_of_one_colour_in_one_room_get_one_material() -> None:
         assert material_of(mutable, 0) == material_of(mutable, 1)
 
 
+def test_the_print_of_upholstery_is_smaller_than_a_hand() -> None:
+    n_printed = 0
+    for seed in range(24):
+        mutable = woven(cushion(), name="fabric", seed=seed)
+        if material_of(mutable).name.startswith("wallpaper"):
+            n_printed += 1
+            surface = mutable.items[0].surfaces[0]
+            corners, uvs = surface.positions[surface.faces], surface.uvs[surface.faces]
+            sides = np.linalg.norm(corners - np.roll(corners, 1, 1), axis=2)
+            repeats = np.linalg.norm(uvs - np.roll(uvs, 1, 1), axis=2)
+            assert np.median(sides / repeats) < 0.2
+    assert n_printed
+
+
 def test_bed_linen_is_not_printed_if_the_table_excludes_it() -> None:
     names = {material_of(woven(cushion(), name="pillow", seed=s)).name for s in range(8)}
     assert all(name.startswith("twill") for name in names)

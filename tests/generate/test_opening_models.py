@@ -8,7 +8,7 @@ import shapely
 
 from pbrs_farm.core.mesh import triangle_corners
 from pbrs_farm.generate.floor_plan import OpeningKind, PlanOpening
-from pbrs_farm.generate.opening_models import LEAVES, OpeningDesign, opening_model
+from pbrs_farm.generate.opening_models import LEAVES, SASHES, OpeningDesign, opening_model
 
 WIDTH, HEIGHT = 0.9, 2.1
 
@@ -26,3 +26,24 @@ def test_no_light_comes_round_a_shut_leaf(leaf: str, kind: OpeningKind, gap_m: f
     open_part = shapely.box(-WIDTH / 2, 0.0, WIDTH / 2, HEIGHT).difference(covered.buffer(1e-5))
     assert open_part.area == pytest.approx(gap_m * WIDTH, rel=0.2, abs=1e-4)
     assert open_part.is_empty or open_part.bounds[3] <= gap_m + 1e-4
+
+
+@pytest.mark.parametrize("sash", SASHES)
+def test_a_larger_window_has_as_many_panes_or_more(sash: str) -> None:
+    shown = []
+    for width, height, sill in ((0.7, 0.9, 1.0), (0.7, 1.5, 0.6), (1.6, 1.5, 0.6)):
+        window = PlanOpening(OpeningKind.WINDOW, 0, 1.0, width, height, sill, 0)
+        shape = opening_model(window, 0.26, OpeningDesign(sash=sash))
+        shown.append(sum(len(s.faces) for s in shape.surfaces if s.name == "pane"))
+    assert shown == sorted(shown)
+    if sash in ("grid", "lattice"):
+        assert shown[0] < shown[1] < shown[2]
+
+
+def test_some_french_windows_have_a_panel_of_wood_below() -> None:
+    lowest = {}
+    for sash in SASHES:
+        door = PlanOpening(OpeningKind.FRENCH_WINDOW, 0, 1.0, 1.6, 2.2, 0.0, 0)
+        shape = opening_model(door, 0.26, OpeningDesign(sash=sash))
+        lowest[sash] = min(s.positions[:, 1].min() for s in shape.surfaces if s.name == "pane")
+    assert lowest["grid"] > 0.4 > lowest["plain"]

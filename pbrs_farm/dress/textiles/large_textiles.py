@@ -19,7 +19,7 @@ from pbrs_farm.dress.textiles.hanging_cloth import round_rail, towel_over_rail
 from pbrs_farm.dress.textiles.rugs import cover_drawn_rugs, lay_rugs
 from pbrs_farm.dress.thing_materials import metal
 from pbrs_farm.dress.walls.hanging import WANTS, Hanging
-from pbrs_farm.geometry.solids import box
+from pbrs_farm.geometry.solids import box, sphere
 from pbrs_farm.home.room_use import RoomKind
 
 PASS = "textiles"
@@ -72,9 +72,15 @@ def _draw_rail(catalogue: Catalogue, rng: np.random.Generator) -> Model | None:
 
 
 def towel_rail(house: MutableHouse, style: Style, rng: np.random.Generator) -> Model:
-    """A rail with a towel over it."""
-    width = float(rng.uniform(0.4, 0.6))
-    towel, drop, z = width * float(rng.uniform(0.6, 0.85)), float(rng.uniform(0.45, 0.7)), 0.07
+    """One or two bars with one or two towels over the inner one, some with balls at their ends."""
+    n_towels, n_bars, has_balls = (
+        1 + int(rng.random() < 0.3),
+        1 + int(rng.random() < 0.25),
+        rng.random() < 0.35,
+    )
+    width = float(rng.uniform(0.4, 0.6)) * (1 + 0.5 * (n_towels - 1))
+    towel = width / n_towels * float(rng.uniform(0.6, 0.85))
+    drop, z, out = float(rng.uniform(0.45, 0.7)), 0.07, 0.07 + 0.06 * (n_bars - 1)
     tint = mix(
         style.textiles[int(rng.integers(len(style.textiles)))],
         (0.93, 0.92, 0.9),
@@ -83,13 +89,19 @@ def towel_rail(house: MutableHouse, style: Style, rng: np.random.Generator) -> M
     r, g, b = (round(c, 2) for c in tint)
     pattern = pattern_material(house, Pattern("loop carpet", int(rng.integers(3)), ((r, g, b),)))
     steel = metal(style)
-    parts: list[tuple[Surface, Material]] = [
-        (towel_over_rail(towel, drop, z, rng), house.materials[pattern.number]),
-        (round_rail("rail", -width / 2, width / 2, drop, z, 0.009), steel),
-    ]
+    parts: list[tuple[Surface, Material]] = []
+    for k in range(n_towels):
+        cloth = towel_over_rail(towel, drop, z, rng)
+        x = np.float32((k - (n_towels - 1) / 2) * width / n_towels)
+        moved = replace(cloth, positions=cloth.positions + np.array((x, 0, 0), np.float32))
+        parts.append((moved, house.materials[pattern.number]))
+    for bar_z in (z, out)[:n_bars]:
+        parts.append((round_rail("rail", -width / 2, width / 2, drop, bar_z, 0.009), steel))
     for sign in (-1, 1):
-        arm = np.array([sign * (width / 2 - 0.01), drop, z / 2])
-        parts.append((box("arm", arm, np.array([0.008, 0.008, z / 2]), 0), steel))
+        arm = np.array([sign * (width / 2 - 0.01), drop, out / 2])
+        parts.append((box("arm", arm, np.array([0.008, 0.008, out / 2]), 0), steel))
+        if has_balls:
+            parts.append((sphere("ball", np.array([sign * width / 2, drop, z]), 0.014, 0), steel))
     return hanging_piece("towel_rail", "towel", TOWEL, parts)
 
 

@@ -14,6 +14,8 @@ from pbrs_farm.dress.space import HouseSpace, Passage
 from pbrs_farm.dress.style import Rgb, Style, shade
 from pbrs_farm.dress.walls.hanging import WANTS, Hanging, faces_behind
 from pbrs_farm.dress.walls.hung_things import (
+    CLOCK_RIMS,
+    SOCKET_FORMS,
     SWITCH_FORMS,
     clock,
     frame_material,
@@ -24,7 +26,7 @@ from pbrs_farm.home.room_use import RoomKind
 
 _SWITCH_M, _SOCKET_M = 1.05, 0.3  # heights of their middles above the floor
 _DATA_SOCKETS, _DATA_SHARE = ("antenna", "rj45"), 0.15  # words of their names, share of sockets
-_CASING_M = 0.16  # distance from a door's opening to the middle of its switch
+_CASING_M = 0.1  # distance from a door's opening to its switch, with a gap of 2 cm
 
 
 def hang_mirrors(hanging: Hanging, space: HouseSpace, style: Style, share: float) -> None:
@@ -87,7 +89,8 @@ def hang_clock(hanging: Hanging, style: Style, share: float) -> None:
     frame = frame_material(rng, style)
     light = rng.random() < 0.75
     dial = jpeg_texture("dial", _dial(rng, (0.93, 0.92, 0.88) if light else (0.1, 0.1, 0.11)))
-    hang_anywhere(hanging, clock(float(rng.uniform(0.24, 0.36)), dial, frame), 1.85, 0.3, rng)
+    diameter, form = float(rng.uniform(0.24, 0.36)), int(rng.integers(len(CLOCK_RIMS)))
+    hang_anywhere(hanging, clock(diameter, dial, frame, form), 1.85, 0.3, rng)
 
 
 def _dial(rng: np.random.Generator, ground: Rgb) -> Srgb8Image:
@@ -161,7 +164,7 @@ def fit_switches(hanging: Hanging, catalogue: Catalogue, style: Style, share: fl
     # All switches of a home are of one make.
     form = int(hanging.house.rng("switches", "form").integers(SWITCH_FORMS))
     switch = _draw_fitting(catalogue, "switch", rng) or content().things["wall_switch"](
-        rng, style, 1, colour, form
+        rng, style, 1 + int(rng.random() < 0.35), colour, form
     )
     lit = 0
     for door in room.doors:
@@ -172,10 +175,11 @@ def fit_switches(hanging: Hanging, catalogue: Catalogue, style: Style, share: fl
         n = int(rng.choice([1, 1, 2, 3]))
         # All mains sockets of a home are of one standard.
         of_home = hanging.house.rng("sockets", "make")
+        form = int(of_home.integers(SOCKET_FORMS))
         socket = _draw_fitting(catalogue, "socket", of_home, leave_out=_DATA_SOCKETS)
         if rng.random() < _DATA_SHARE:
             socket = _draw_fitting(catalogue, "socket", rng, only=_DATA_SOCKETS) or socket
-        socket = socket or content().things["wall_socket"](rng, style, n, colour)
+        socket = socket or content().things["wall_socket"](rng, style, n, colour, form)
         hang_anywhere(hanging, socket, _SOCKET_M - 0.04, 0.05, rng)
 
 
@@ -215,7 +219,7 @@ def _fit_beside_door(
     half = float(np.abs(shape.bounds[:, 0]).max()) + 0.02
     order = (1.0, -1.0) if rng.random() < 0.5 else (-1.0, 1.0)
     for sign in order:
-        position = door.face_point(side) + door.along * sign * (door.width / 2 + _CASING_M)
+        position = door.face_point(side) + door.along * sign * (door.width / 2 + _CASING_M + half)
         for k, face in enumerate(hanging.faces):
             out = float(face.out_of(position[None])[0])
             if abs(out) > 0.06 or float(face.normal @ door.inward(side)) < 0.95:

@@ -237,15 +237,15 @@ def mirror(
     return hanging_piece("mirror", "mirror", MIRROR, parts)
 
 
-def clock(diameter: float, dial: Texture, frame: Material) -> Model:
-    """A round wall clock with a printed dial."""
+def clock(diameter: float, dial: Texture, frame: Material, form: int = 0) -> Model:
+    """A round wall clock with a printed dial, in one of CLOCK_RIMS."""
     r = diameter / 2
-    rim = content().facing_disc(
-        [(0, 0), (r, 0), (r, 0.035), (r - 0.012, 0.035), (r - 0.012, 0.024)], r
-    )
-    face = replace(content().facing_disc([(r - 0.012, 0.024), (0, 0.024)], r), name="dial")
+    profile = [(r - inset, z) for inset, z in CLOCK_RIMS[form]]
+    rim = content().facing_disc([(0, 0), *profile], r)
+    inner, z = profile[-1]
+    face = replace(content().facing_disc([(inner, z), (0, z)], r), name="dial")
     # Lay the dial's picture over the disc.
-    uv = (face.positions[:, :2] - [0, r]) / (2 * (r - 0.012)) + 0.5
+    uv = (face.positions[:, :2] - [0, r]) / (2 * inner) + 0.5
     parts = [
         (replace(rim, name="rim"), frame),
         (replace(face, uvs=uv.astype(np.float32)), _printed(dial, 0.4)),
@@ -266,3 +266,11 @@ def _printed(texture: Texture, roughness: float = 0.7) -> Material:
 
 CUPBOARD_FORMS: Final = 6
 SWITCH_FORMS: Final = 6
+SOCKET_FORMS: Final = 5  # national standards
+CLOCK_RIMS: Final = (
+    ((0.0, 0.0), (0.0, 0.035), (0.012, 0.035), (0.012, 0.024)),
+    ((0.0, 0.0), (0.0, 0.02), (0.01, 0.03), (0.03, 0.036), (0.036, 0.024)),
+    ((0.0, 0.0), (0.0, 0.012), (0.004, 0.026), (0.012, 0.032), (0.02, 0.026), (0.022, 0.018)),
+    ((0.0, 0.0), (0.0, 0.022)),
+)
+"""Profiles of a wall clock's rim: inset from its edge and distance from the wall, metres."""

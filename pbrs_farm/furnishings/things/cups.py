@@ -26,9 +26,13 @@ def cup(m: Maker) -> None:
         match form:
             case 0 | 1:  # a mug
                 foot = r * m.uniform(0.65, 1.0)
-                m.vessel([(0, 0), (foot, 0), (foot + 0.3 * (r - foot), 0.012), (r, 0.4 * tall),
-                    (r, tall)], 0.003, of=glaze)
-                m.add(handle(r, tall))
+                # Curved from its foot, on a ring, like a barrel.
+                m.vessel([(0, 0), *m.pick(
+                    [(foot, 0), (foot + 0.3 * (r - foot), 0.012), (r, 0.4 * tall), (r, tall)],
+                    [(0.8 * r, 0), (0.78 * r, 0.004), (r, 0.01), (r, tall)],
+                    [(0.85 * r, 0), (r, 0.3 * tall), (1.04 * r, 0.55 * tall), (r, 0.8 * tall),
+                        (0.94 * r, tall)])], 0.003, of=glaze)
+                m.add(handle(0.97 * r, tall))
             case 2:  # a tea cup on its saucer
                 m.vessel([(0, 0.0122), (r * 0.6, 0.0122), (r * 0.7, 0.018), (r * 1.05, 0.045),
                     (r * 1.15, 0.068)], 0.0025, n=20)

@@ -29,6 +29,13 @@ from pbrs_farm.geometry.solids import lathe, quads_surface
 # fmt: off
 _STICKY: Final[tuple[Rgb, ...]] = ((0.95, 0.88, 0.35), (0.95, 0.6, 0.7), (0.6, 0.85, 0.6),
     (0.55, 0.8, 0.93))
+# middle (x, y), width and height of the slots of a socket, by form
+_SLOTS: Final = {
+    2: [(0.0, 0.052, 0.004, 0.009), (-0.011, 0.03, 0.008, 0.004), (0.011, 0.03, 0.008, 0.004)],
+    3: [(x, y + dy, w, h) for y in (0.037, 0.078) for x, dy, w, h in ((-0.006, 0.0, 0.002, 0.008),
+        (0.006, 0.0, 0.002, 0.007), (0.0, -0.011, 0.005, 0.005))],
+    4: [(x, 0.0405, 0.005, 0.005) for x in (-0.013, 0.0, 0.013)],
+}
 # turns an upright solid so that its top faces +z
 _LYING: Final = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
 
@@ -168,14 +175,25 @@ def hung_cup(m: Maker, x: float, y: float) -> None:
 
 
 @thing(group="socket", place=Place.WALL)
-def wall_socket(m: Maker, n: int, colour: Rgb) -> None:
-    """Sockets of the usual 8 cm beside one another."""
+def wall_socket(m: Maker, n: int, colour: Rgb, form: int) -> None:
+    """Sockets of the usual 8 cm beside one another, by national standard.
+
+    A round well, one with a pin, slots below a rocker, two pairs of slots, three holes in a row.
+    """
+    hole = plain("plate hole", shade(colour, 0.25), 0.5)
+    xs = [(k - (n - 1) / 2) * 0.081 for k in range(n)]
     with m.of(plain("plate", colour, 0.3)):
-        cover(m, n)
-    for k in range(n):
-        m.add(facing_disc([(0.019 + 0.003, 0.009), (0.019, 0.0093), (0, 0.0093)], 0.0405,
-            (k - (n - 1) / 2) * 0.081), name="well", of=plain("plate hole", shade(colour, 0.25),
-            0.5))
+        cover(m, n, 0.115 if form == 3 else 0.081)
+        for x in xs if form == 2 else ():
+            m.box(0.012, (0.05, 0.07), (0.0085, 0.0125), x=x + 0.022, name="rocker")
+    for x in xs:
+        if form < 2:
+            m.add(facing_disc([(0.019 + 0.003, 0.009), (0.019, 0.0093), (0, 0.0093)], 0.0405, x),
+                name="well", of=hole)
+        for dx, y, w, h in _SLOTS.get(form, ()):
+            m.box(w, (y - h / 2, y + h / 2), (0.0088, 0.0093), x=x + dx, name="well", of=hole)
+        if form == 1:
+            m.box(0.005, (0.049, 0.054), (0.009, 0.019), x=x, name="pin", of=m.metal)
 
 
 @thing(group="switch", place=Place.WALL)
@@ -211,9 +229,9 @@ def wall_switch(m: Maker, n: int, colour: Rgb, form: int) -> None:
                 m.box(0.006, 0.006, (0.0088, 0.0104), on=y - 0.003, name="screw")
 
 
-def cover(m: Maker, n: int) -> None:
+def cover(m: Maker, n: int, tall: float = 0.081) -> None:
     """The plate of n switches or sockets side by side."""
-    m.box(0.081 * n, 0.081, (0.0, 0.009), name="plate")
+    m.box(0.081 * n, tall, (0.0, 0.009), name="plate")
 
 
 @thing(group="mirror", nyu40=MIRROR, place=Place.WALL)
@@ -285,11 +303,15 @@ def coat_rack(m: Maker, n: int, is_bath: bool) -> None:
     half = n * 0.3 / 2
     m.box(2 * half, 0.09, (0.0, 0.018), of=plain("rack " + m.style.wood.name, m.wood,
         0.4) if m.chance(0.6) else plain("rack white", (0.9, 0.9, 0.88), 0.4))
-    # A hook is an arm out of the board and a tip that turns up.
+    hook = m.pick("arm", "knob", "peg")
     for k in range(n):
         x = -half + (k + 0.5) * 0.3
-        m.box(0.016, (0.035, 0.05), (0.018, 0.06), x=x, of=m.metal)
-        m.box(0.016, (0.05, 0.07), (0.048, 0.06), x=x, of=m.metal)
+        if hook == "arm":  # out of the board, its tip turns up
+            m.box(0.016, (0.035, 0.05), (0.018, 0.06), x=x, of=m.metal)
+            m.box(0.016, (0.05, 0.07), (0.048, 0.06), x=x, of=m.metal)
+        else:
+            m.add(facing_disc([(0.008, 0.018), (0.007, 0.06)] + ([(0.017, 0.064), (0.017, 0.07)]
+                if hook == "knob" else []) + [(0, 0.072)], 0.05, x), of=m.metal)
         if n == 1 or m.chance(0.85):
             coat(m, x, is_bath)
 

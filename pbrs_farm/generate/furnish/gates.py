@@ -100,7 +100,10 @@ def _blocked(space: FurnishSpace, pieces: list[PlacedPiece]) -> list[str]:
         if piece.piece.group == "sink":
             top = 0.9
         for window in space.windows:
-            if top > window.sill + 0.1 and piece.elevation < 1.9 and _meet(ground, window.zone):
+            hides = any(
+                top > low + 0.02 and _meet(ground, zone) for zone, low in window.clear_above
+            )
+            if hides and piece.elevation < 1.9:
                 faults.append(f"{piece.piece.name} hides a window")
     return faults
 

@@ -26,7 +26,6 @@ Ints = NDArray[np.int64]
 _STEP_M: Final = 0.10
 _FREE_STEP_M: Final = 0.15
 _TOUCH_M: Final = 0.002
-_ABOVE_SILL_M: Final = 0.08
 _DEAD_GAP_M: Final = 0.35  # a gap that nobody can use
 BESIDE_M: Final = 0.01  # between furniture and the wall at its end
 _APART_M: Final = 0.4  # minimum distance between two candidate places of one template, metres
@@ -178,10 +177,10 @@ def allowed(template: Template, frames: F64, space: FurnishSpace) -> Bools:
     bad = overlap(bodies, np.concatenate([space.outside, space.doors])).any(1)
     if template.clear:
         bad |= overlap(_rects_in_frames(np.array(template.clear), frames), space.outside).any(1)
-    for window in space.windows:
-        tall = [s.rect for s in template.slots if s.screen_top > window.sill + _ABOVE_SILL_M]
+    for zone, low in (strip for window in space.windows for strip in window.clear_above):
+        tall = [s.rect for s in template.slots if s.screen_top > low]
         if tall:
-            bad |= overlap(_rects_in_frames(np.array(tall), frames), np.array([window.zone])).any(1)
+            bad |= overlap(_rects_in_frames(np.array(tall), frames), np.array([zone])).any(1)
     return np.asarray(~bad)
 
 

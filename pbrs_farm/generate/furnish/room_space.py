@@ -21,6 +21,9 @@ from pbrs_farm.generate.furnish.template import WallFrame
 BEFORE_DOOR_M: Final = 0.8
 BEFORE_FRENCH_M: Final = 0.6
 _BEFORE_WINDOW_M: Final = 0.4
+_TALL_BEFORE_WINDOW_M: Final = 0.65  # for furniture that hides much of a window
+_ABOVE_SILL_M: Final = 0.08  # furniture up to so far above a sill is not before its window
+_TALL_ABOVE_SILL_M: Final = 0.5
 _SPARE_M: Final = 0.03  # behind an open leaf
 _BESIDE_DOOR_M: Final = 0.01  # more than two rectangles may overlap unseen (places.py)
 _OPEN_M: Final = 0.9  # kept free along the middle of a side without a wall
@@ -40,14 +43,23 @@ class RoomWall:
 
 @dataclass(frozen=True, slots=True)
 class Window:
-    """The strip in front of a window, to keep clear."""
+    """A window of a room, with the strips in front of it to keep clear."""
 
     zone: Rect
+    tall_zone: Rect  # for furniture that hides much of it
     sill: float
     middle: Point
     wall: int  # index into RoomSpace.walls; -1 = none
     low: float  # along that wall
     high: float
+
+    @property
+    def clear_above(self) -> tuple[tuple[Rect, float], ...]:
+        """Strips, each with the height above the floor from which it is kept clear."""
+        return (
+            (self.zone, self.sill + _ABOVE_SILL_M),
+            (self.tall_zone, self.sill + _TALL_ABOVE_SILL_M),
+        )
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -307,5 +319,7 @@ def _window_of_opening(
         if abs(across) < 0.05 and -half < along < wall.length + half:
             number, low, high = k, along - half, along + half
             break
-    zone = frame.rect((-half, 0.0, half, depth))
-    return Window(zone, opening.sill, (frame.x, frame.z), number, low, high)
+    zone, tall_zone = (
+        frame.rect((-half, 0.0, half, d)) for d in (depth, max(depth, _TALL_BEFORE_WINDOW_M))
+    )
+    return Window(zone, tall_zone, opening.sill, (frame.x, frame.z), number, low, high)

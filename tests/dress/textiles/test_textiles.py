@@ -238,12 +238,17 @@ def test_a_rug_shows_its_picture_on_top() -> None:
     assert np.ptp(face.positions[:, 2]) == pytest.approx(1.0)
 
 
-def test_a_towel_hangs_over_its_rail() -> None:
+def test_towels_hang_over_rails_of_several_constructions() -> None:
     mutable = MutableHouse(builtin_home(), 1)
-    piece, shape = towel_rail(mutable, STYLE, np.random.default_rng(2))
-    assert piece.nyu40 == 27
-    assert shape.bounds[0, 2] == pytest.approx(0, abs=1e-6)
-    assert shape.bounds[0, 1] == pytest.approx(0, abs=0.005)
+    constructions = set()
+    for seed in range(24):
+        piece, shape = towel_rail(mutable, STYLE, np.random.default_rng(seed))
+        constructions.add(tuple(sorted(s.name for s in shape.surfaces)))
+        assert piece.nyu40 == 27
+        assert shape.bounds[0, 2] == pytest.approx(0, abs=1e-6)
+        assert shape.bounds[0, 1] == pytest.approx(0, abs=0.005)
+        assert shape.bounds[:, 0].sum() == pytest.approx(0, abs=1e-5)
+    assert len(constructions) >= 5
 
 
 def test_a_seed_decides_every_bit_and_no_share_adds_nothing() -> None:

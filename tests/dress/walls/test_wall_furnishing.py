@@ -16,7 +16,7 @@ from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import house_space
 from pbrs_farm.dress.style import Style, style_for
 from pbrs_farm.dress.surface_finishes import material_of_finish
-from pbrs_farm.dress.walls import furnish_walls
+from pbrs_farm.dress.walls import furnish_walls, hung_things
 from pbrs_farm.dress.walls.hang_walls import hang_coats
 from pbrs_farm.dress.walls.hanging import WANTS, Hanging
 from pbrs_farm.dress.walls.radiators import hang_radiators, wants_radiators
@@ -63,7 +63,8 @@ def _named(mutable: MutableHouse, name: str) -> list[Item]:
         (hung.pin_board, (0.8, 0.5, Material("frame"))), (hung.tool_rail, (0.9,)), (radiators.towel_radiator, ()),
         *((hung.wall_cupboard, (Material("body"), Material("front"), 0.8, 0.6, 0.3, 2, n)) for n in range(6)),
         (hung.open_cupboard, (Material("body"), 0.8, 0.6, 0.3)),
-        *((hung.wall_switch, (2, (0.9, 0.9, 0.9), n)) for n in range(6)),
+        *((hung.wall_switch, (2, (0.9, 0.9, 0.9), n)) for n in range(hung_things.SWITCH_FORMS)),
+        *((hung.wall_socket, (2, (0.9, 0.9, 0.9), n)) for n in range(hung_things.SOCKET_FORMS)),
     ],
 )  # fmt: skip
 def test_wall_items_begin_at_their_wall_and_face_outwards(

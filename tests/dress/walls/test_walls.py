@@ -24,6 +24,7 @@ from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import HouseSpace, WallFace, house_space
 from pbrs_farm.dress.style import Style, style_for
 from pbrs_farm.dress.walls import furnish_walls, hung_things
+from pbrs_farm.dress.walls.hung_things import CLOCK_RIMS
 from pbrs_farm.dress.walls.pictures import Gallery
 from pbrs_farm.furnishings.prints import FAMILIES, palette_of, print_pixels
 from pbrs_farm.furnishings.things.hung import round_mirror
@@ -175,7 +176,7 @@ def test_a_framed_print_shows_its_picture_upright_and_its_faces_outward() -> Non
 def test_a_round_item_faces_away_from_the_wall() -> None:
     dial = hung_things.jpeg_texture("t", np.zeros((8, 8, 3), np.uint8))
     for _piece, shape in (
-        hung_things.clock(0.3, dial, Material("rim")),
+        *(hung_things.clock(0.3, dial, Material("rim"), k) for k in range(len(CLOCK_RIMS))),
         round_mirror.make(np.random.default_rng(1), _style(), 0.5, Material("rim")),
     ):
         front = shape.surfaces[1]
