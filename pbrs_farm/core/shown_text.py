@@ -20,6 +20,9 @@ MAX_PLACE: Final = 120
 MAX_MESSAGE: Final = 600
 """Characters of a whole message."""
 
+MANY_NAMES: Final = 16
+"""A list of more names is shown only where no near one is known."""
+
 _MAX_MARKS: Final = 3  # combining marks on one letter: more run over the lines above and below
 _JOINERS: Final = "\u200c\u200d\ufe0f"  # format characters that scripts and pictographs need
 _UNSAFE: Final = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"})
@@ -100,6 +103,7 @@ def question(names: list[str]) -> str:
 
 
 def hint_of_choice(word: str, known: Iterable[str]) -> str:
-    """ "did you mean A? of A, B, C": for a word of a short list; see `did_you_mean` for long ones."""
+    """ "did you mean A? of A, B, C"; of a long list only the near names, where there are some."""
     names = list(known)
-    return " ".join(x for x in (did_you_mean(word, names), f"of {', '.join(names)}") if x)
+    near, all_names = did_you_mean(word, names), f"of {', '.join(names)}"
+    return near if near and len(names) > MANY_NAMES else f"{near} {all_names}".strip()

@@ -24,6 +24,7 @@ from pbrs_farm.core.lighting import Mode
 from pbrs_farm.core.record import Record
 from pbrs_farm.core.resampling import resized_any, resized_by_area, resized_nearest
 from pbrs_farm.core.shot import Shot
+from pbrs_farm.core.shown_text import hint_of_choice
 from pbrs_farm.formats.class_map import ClassMap
 from pbrs_farm.formats.layer_file import layer_bytes, layer_from_bytes
 from pbrs_farm.formats.output_folder import OutputHouse, ViewEntry
@@ -65,7 +66,7 @@ class Choice:
         labels = [layer.name for layer in LAYERS if layer.name not in _MODES]
         for name in self.layers or ():
             if name not in labels:
-                raise BadInput("--layers", name, "no such layer", hint=f"of {', '.join(labels)}")
+                raise BadInput("--layers", name, "no such layer", hint=hint_of_choice(name, labels))
         for mode in self.modes or ():
             if mode not in _MODES:
                 hint = f"of {', '.join(_MODES)}"

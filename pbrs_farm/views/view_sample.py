@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.checked_calls import as_words, check_fields
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lighting import Mode
+from pbrs_farm.core.shown_text import hint_of_choice
 from pbrs_farm.views.normal_axes import AXES
 
 # Layers of a request. "normal" brings "valid" along.
@@ -73,7 +74,7 @@ class SampleRequest:
         check_fields(self)
         for layer in self.layers:
             if layer not in LAYERS:
-                raise BadInput("layers", layer, "no such layer", hint=f"of {', '.join(LAYERS)}")
+                raise BadInput("layers", layer, "no such layer", hint=hint_of_choice(layer, LAYERS))
         if self.mode not in MODES:
             hint = f"of {', '.join(MODES)}"
             raise BadInput("mode", self.mode, "no such lighting mode", hint=hint)
