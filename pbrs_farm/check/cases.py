@@ -7,7 +7,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
-from typing import Any, NamedTuple, TypeVar
+from typing import Any, NamedTuple, Protocol, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,6 +27,19 @@ Channels = Mapping[str, F32]  # of radiance.exr
 Pixels = tuple[I64, I64]  # rows and columns, each (N,)
 
 _T = TypeVar("_T")
+
+
+class Tracer(Protocol):
+    """Traces light of a stored view again, at another size."""
+
+    @property
+    def variant(self) -> str:
+        """Mitsuba's variant."""
+
+    def light(
+        self, house_id: str, view_id: str, width_px: int, height_px: int
+    ) -> Mapping[str, F32]:
+        """(H, W, 3) radiance of each light group; BadInput or RenderFailed if it cannot be traced."""
 
 
 class Scene(NamedTuple):
@@ -155,6 +168,7 @@ class HouseCase:
     times: ScenesInTime
     tally: Tally
     views: tuple[SeenView, ...] = ()
+    tracer: Tracer | None = None
 
     @cached_property
     def rest(self) -> Scenes:
@@ -182,6 +196,7 @@ class ViewCase:
     radiance: Callable[[], Channels]  # reads radiance.exr once
     is_halved: bool  # denoised light is recomputed at half the picture's size
     arrays: Layers = field(default_factory=dict)
+    tracer: Tracer | None = None
 
     @property
     def house(self) -> StoredHouse:

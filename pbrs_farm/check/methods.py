@@ -33,9 +33,10 @@ def _methods(of: str) -> dict[str, str]:
 
 
 # Facts that no file of a root holds.
-_NEVER = (
-    "levels of light, except visible bulbs and the minimum from sun and bulbs: no light is traced",
-    "house.glb and house.json against their source, which is not stored",
+_NEVER = ("house.glb and house.json against their source, which is not stored",)
+_UNTRACED = (
+    "levels of light and its colour, except visible bulbs and the minimum from sun and bulbs: no light is"
+    " traced; `pbrs-farm verify ROOT --light` traces it again"
 )
 
 
@@ -63,11 +64,13 @@ def not_looked_at(
     views: list[StoredView],
     fields: Counter[tuple[str, str]],
     n_halved: int = 0,
+    *,
+    is_traced: bool = False,
 ) -> tuple[str, ...]:
     """A line for each kind of file that only has a hash, or little more, and for each field without a check.
 
     With each view whose light could not be developed again and why, the number of views that were
-    denoised at half their size, and the lines that apply to every root.
+    denoised at half their size, light that was not traced again, and the lines that apply to every root.
     """
     counts, how_of = _file_counts(views), how_of_files()
     layers = {layer.file for layer in LAYERS}
@@ -84,6 +87,8 @@ def not_looked_at(
             f"light of {n_halved} views was denoised again at half its size: compared by tiles of 32 px; "
             "--all repeats it at full size"
         )
+    if counts["radiance.exr"] and not is_traced:
+        lines.append(_UNTRACED)
     return (*lines, *_NEVER)
 
 

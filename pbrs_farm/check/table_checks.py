@@ -10,6 +10,7 @@ from functools import cached_property
 from typing import Any
 
 import numpy as np
+from scipy import stats
 
 from pbrs_farm.check.axes import into_frame
 from pbrs_farm.check.cases import Pixels, ViewCase
@@ -23,7 +24,7 @@ from pbrs_farm.core.arrays import F64
 _BOX_M = 0.001  # tolerance of a box's sides
 _BORDER_PX = 0.02  # within this of the picture's border a vertex is in or out
 _MAX_RAYS = 2000  # of an item whose share is judged by a sample
-_SIGMAS = 5.0  # of a sample's share
+_CHANCE = 3e-7  # of a true sample with so few hits, or so many: five sigmas
 _EDGE = 0.004  # share of an item's pixels whose centres are on its outline
 _LENS = 0.1  # tolerance of a share resampled from pinholes (docs/lenses.md)
 
@@ -127,12 +128,16 @@ def _share_fault(case: ViewCase, row: dict[str, Any], corners: F64, rays: Rays) 
     hidden = hits * n_all / max(n, 1)
     # Compare counts of pixels, within the error of the sample and of the outline.
     stored = visible / share - visible
-    part = max(min(stored / n_all, 1.0), 1 / n) if n else 0.0
-    spread = n_all * np.sqrt(part * (1 - part) / n) if 0 < n < n_all else 0.0
-    slack = _SIGMAS * spread + 2 + _EDGE * (visible + hidden)
+    slack = 2 + _EDGE * (visible + hidden)
     if view.lens is not None:
         slack += _LENS * (visible + hidden) + 4 * np.sqrt(visible)
-    if abs(stored - hidden) <= slack:
+    if n == n_all:
+        is_right = abs(stored - hidden) <= slack
+    else:
+        low, high = (float(np.clip((stored + s) / n_all, 0, 1)) for s in (-slack, slack))
+        fewest, most_hits = stats.binom.ppf(_CHANCE, n, low), stats.binom.isf(_CHANCE, n, high)
+        is_right = bool(fewest <= hits <= most_hits)
+    if is_right:
         return ""
     return f"is {share:.4f}, here {visible / (visible + hidden):.4f}"
 

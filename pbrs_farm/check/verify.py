@@ -16,7 +16,15 @@ from typing import Any
 
 import numpy as np
 
-from pbrs_farm.check.cases import SAMPLE, HouseCase, RootCase, ScenesInTime, SeenView, ViewCase
+from pbrs_farm.check.cases import (
+    SAMPLE,
+    HouseCase,
+    RootCase,
+    ScenesInTime,
+    SeenView,
+    Tracer,
+    ViewCase,
+)
 from pbrs_farm.check.certificate import Certificate, Tally
 from pbrs_farm.check.checks import Subject, checks
 from pbrs_farm.check.fields import stored_fields
@@ -41,12 +49,14 @@ def verify(
     *,
     sample: int | None = None,
     all_pixels: bool = False,
+    tracer: Tracer | None = None,
     tell: Callable[[int, int], None] = lambda _n, _of: None,
 ) -> Certificate:
     """Check every house and view below folder (an output root) and report how much was checked.
 
     sample: pixels of each view to recompute by rays (SAMPLE when None); all_pixels: every
-    one. Checks on files, tables and whole pictures are always complete. tell: called after each
+    one. Checks on files, tables and whole pictures are always complete. tracer: traces light again, which
+    is compared with the stored light; None = it is listed as not checked. tell: called after each
     view with the number of views checked and their total. Raises BadInput if folder is no output root.
     """
     folders = [p for name in keys.FOLDERS for p in (folder / name).glob("*") if p.is_dir()]
@@ -64,7 +74,7 @@ def verify(
     for house in houses:
         _run("files", RootCase(folder, (house,), tally))
         of_house, halved = _check_house(
-            house, n_pixels, tally, lambda: tell(next(checked), n_views)
+            house, n_pixels, tally, tracer, lambda: tell(next(checked), n_views)
         )
         views, n_halved = views + of_house, n_halved + halved
     _judge_ties(tally)
@@ -72,7 +82,7 @@ def verify(
     fields = stored_fields(folder, houses)
     return tally.certificate(
         str(folder), len(houses), len(views), all_pixels=all_pixels,
-        unfinished=tuple(rendered.values()), looked_at=looked_at(views, fields), not_looked_at=not_looked_at(folder, houses, views, fields, n_halved),
+        unfinished=tuple(rendered.values()), looked_at=looked_at(views, fields), not_looked_at=not_looked_at(folder, houses, views, fields, n_halved, is_traced=tracer is not None),
     )  # fmt: skip
 
 
@@ -99,7 +109,11 @@ def _fault(error: Exception) -> str:
 
 
 def _check_house(
-    folder: Path, n_pixels: int | None, tally: Tally, tell: Callable[[], None]
+    folder: Path,
+    n_pixels: int | None,
+    tally: Tally,
+    tracer: Tracer | None,
+    tell: Callable[[], None],
 ) -> tuple[list[StoredView], int]:
     """Check a house; returns its readable views, and the number of those whose light is halved.
 
@@ -116,7 +130,7 @@ def _check_house(
     except (BadFile, BadGlb) as error:
         tally.expect("layers", house.id, False, f"house.glb {error}")
         return [], 0
-    case = HouseCase(house, glb, ScenesInTime(house, triangles), tally)
+    case = HouseCase(house, glb, ScenesInTime(house, triangles), tally, tracer=tracer)
     _run_each("house", case, "layers")
     # A damaged view fails and the next ones go on.
     checked: list[SeenView] = []
@@ -137,7 +151,9 @@ def _check_view(
     """Check a view; returns it with its labels, [] if these cannot be read."""
     now = house.times.at(view.table.get("time_s"))
     radiance = functools.cache(lambda: read_radiance(view, house.tally))
-    case = ViewCase(view, now, house.times, n_pixels, house.tally, radiance, is_halved)
+    case = ViewCase(
+        view, now, house.times, n_pixels, house.tally, radiance, is_halved, tracer=house.tracer
+    )
     _run("camera", case)
     arrays = read_labels(view, house.tally)
     if arrays is None:

@@ -43,7 +43,10 @@ def add_verbs(verb: Verb) -> None:
     p = verb("verify", _verify)
     add = p.add_argument
     add("folder", metavar="ROOT", nargs="?", help="output folder or s3://bucket/prefix")
-    text = "check the renderer instead of a folder, in under a minute: furnace rooms, Metropolis against path"
+    text = (
+        "also trace the folder's light again, small, and compare; without a folder: check the renderer,"
+        " in under a minute: furnace rooms, Metropolis against path"
+    )
     add("--light", action="store_true", help=text)
     add("--all", action="store_true", help="check every pixel instead of a sample")
     add("--sample", type=int, metavar="N", help="pixels per view")
@@ -123,19 +126,21 @@ def write_sheets(folder: Path, max_views: int, parts: SheetParts | None = None) 
 def _verify(args: argparse.Namespace) -> int:
     if args.folder is None and not args.light:
         raise BadInput("verify", "", "nothing to verify", hint="give a FOLDER, or --light")
-    if args.folder is not None and args.light:
-        raise BadInput("verify", str(args.folder), "--light takes no folder")
-    return _verify_light(args) if args.light else _verify_folder(args)
+    return _verify_light(args) if args.folder is None else _verify_folder(args)
 
 
 def _verify_folder(args: argparse.Namespace) -> int:
     from pbrs_farm.check import verify
     from pbrs_farm.progress import counting_bar
+    from pbrs_farm.run.light_again import LightAgain
 
     if args.sample is not None:
         at_least("--sample", args.sample, 1)
     with folder_of(args.folder) as folder, counting_bar("views") as tell:
-        certificate = verify(folder, sample=args.sample, all_pixels=args.all, tell=tell)
+        tracer = LightAgain(folder) if args.light else None
+        certificate = verify(
+            folder, sample=args.sample, all_pixels=args.all, tracer=tracer, tell=tell
+        )
     if args.json:
         echo_json(certificate.model_dump(mode="json"))
     else:

@@ -17,10 +17,12 @@ import numpy as np
 from pbrs_farm.check import verify
 from pbrs_farm.core.recipe import recipe_from_json
 from pbrs_farm.formats.pairs_parquet import pairs_from_parquet, pairs_parquet
-from pbrs_farm.formats.radiance_exr import radiance_from_exr
 from pbrs_farm.images import array_from_png, exr_from_layers, layers_from_exr, png_from_array
-from pbrs_farm.run.relight import linear_aovs
-from pbrs_farm.transport.develop.mode_pictures import develop
+from pbrs_farm.run.house_cache import HouseCache
+from pbrs_farm.run.light_again import LightAgain
+from pbrs_farm.run.step_cache import Work
+from pbrs_farm.run.steps import run_step
+from pbrs_farm.store.folder import FolderStore
 from tests.check.roots import house_of, sign
 from tests.check.sorts_of_roots import sunlit
 
@@ -343,24 +345,21 @@ def light(change: Callable[[dict[str, np.ndarray]], object]) -> Plant:
 
 
 def develop_again(view: Path) -> None:
-    """Develop radiance.exr again and update the facts in view.json and in the step's marker."""
-    root = view.parents[3]
+    """Do the steps after light again, so that pictures, shading, histogram and facts agree with radiance.exr."""
+    root, house = view.parents[3], view.parents[1].name
     recipe = recipe_from_json((root / "recipe.json").read_bytes(), "recipe.json")
-    stored = radiance_from_exr((view / "radiance.exr").read_bytes(), "radiance.exr")
-    tone = recipe.camera_of(view.parents[1].name, view.name).tone
-    images = develop(linear_aovs(stored), tone, denoise=recipe.light.denoise)
-    facts = {}
-    for mode, image in images.items():
-        (view / f"{mode}.png").write_bytes(png_from_array(image.rgb_srgb8))
-        facts[str(mode)] = image.facts()
-    table(lambda t: t["modes"]["develop"].update(facts))(view)
-    document(f"done/develop.{view.name}.json", lambda m: m["facts"].update(facts))(view)
+    for step in ("develop", "view"):
+        marker = view.parents[1] / f"done/{step}.{view.name}.json"
+        layers = tuple(json.loads(marker.read_text())["facts"].get("layers", ()))
+        marker.unlink()
+        store, cache = FolderStore(root), HouseCache()
+        run_step(step, Work(store, recipe, house, cache, view_id=view.name, layers=layers))
 
 
 def light_planes(planes: dict[str, np.ndarray], *names: str) -> list[str]:
-    """Channels of the named light groups, by default of all groups and lamps."""
+    """Channels of the named light groups and their diffuse light, by default of all groups and lamps."""
     chosen = names or ("outdoor", "indoor", "lamp")
-    return [n for n in planes if n.startswith(chosen)]
+    return [n for n in planes if n.removeprefix("diffuse_").startswith(chosen)]
 
 
 def each(change: Callable[[np.ndarray], np.ndarray], *names: str) -> Plant:
@@ -378,6 +377,25 @@ def of_other_view(*, with_guides: bool) -> Plant:
         light(lambda p: p.update({n: theirs[n] for n in names}))(view)
 
     return plant
+
+
+def rows_exchanged(array: np.ndarray) -> np.ndarray:
+    """Rows exchanged in pairs."""
+    return array.reshape(-1, 2, *array.shape[1:])[:, ::-1].reshape(array.shape)
+
+
+def darker_patch(array: np.ndarray) -> np.ndarray:
+    """A patch in the middle, a fifth of the picture's width and height, at 0.3 of its light."""
+    new, (h, w) = array.copy(), array.shape
+    new[h // 3 : h * 8 // 15, w // 3 : w * 8 // 15] *= 0.3
+    return new
+
+
+def doubled(colour: str, *names: str) -> Plant:
+    """One colour of some light groups twice as bright."""
+    return light(
+        lambda p: p.update({n: 2 * p[n] for n in light_planes(p, *names) if n.endswith(colour)})
+    )
 
 
 def exchange_groups(planes: dict[str, np.ndarray]) -> None:
@@ -718,6 +736,15 @@ _FINISHED |= {
     "lamps of a tenth of the light": (each(scaled(0.1), "indoor"), "lamplight"),
     "daylight of ten times the light": (each(scaled(10), "outdoor"), "levels"),
     "light of one colour all over": (each(lambda a: np.full_like(a, a.mean())), "light edges"),
+    "light with its rows exchanged in pairs": (each(rows_exchanged), "light edges"),
+    "light with its columns exchanged in pairs": (each(lambda a: rows_exchanged(a.T).T), "light edges"),
+    "light with a darker patch": (each(darker_patch), "light traced"),
+    "outdoor light with a darker patch": (each(darker_patch, "outdoor"), "light traced"),
+    "green light doubled": (doubled(".G"), "light traced"),
+    "blue light of lamps doubled": (doubled(".B", "indoor"), "light traced"),
+    "red daylight doubled": (doubled(".R", "outdoor"), "light traced"),
+    "lamps of half the light": (each(scaled(0.5), "indoor"), "light traced"),
+    "daylight of half the light": (each(scaled(0.5), "outdoor"), "light traced"),
     "outdoor and indoor light exchanged": (light(exchange_groups), "colours of light"),
     "guides mirrored": (light(lambda p: p.update({n: a[:, ::-1] for n, a in p.items() if n[0] in "an"})), "light guides"),
     "normal guides of another frame": (light(lambda p: swap_keys_of(p, "normal.X", "normal.Z")), "light guides"),
@@ -771,7 +798,9 @@ FALSEHOODS: dict[str, dict[str, tuple[Plant, str]]] = {
 
 def planted(root: Path, sort: str, kind: str) -> set[str]:
     """The failing checks after a falsehood is planted in a root of that sort, with its hashes updated."""
-    plant, _check = FALSEHOODS[sort][kind]
+    plant, check = FALSEHOODS[sort][kind]
     plant(view_of(root))
     sign(root, house_of(root))
-    return {name for name, count in verify(root).counts.items() if count.failed}
+    tracer = LightAgain(root) if check == "light traced" else None
+    counts = verify(root, tracer=tracer).counts
+    return {name for name, count in counts.items() if count.failed}

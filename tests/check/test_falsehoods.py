@@ -12,9 +12,11 @@ import pytest
 from numpy.typing import NDArray
 
 from pbrs_farm.check import developing, fields, light_checks, methods, verify
+from pbrs_farm.cli import main
 from pbrs_farm.core import layers
 from pbrs_farm.core.layers import optional_layer
 from pbrs_farm.images import array_from_png, png_from_array
+from pbrs_farm.run.light_again import LightAgain
 from pbrs_farm.views.open_views import open_views
 from tests.check.falsehoods import FALSEHOODS, edit_json, planted, view_of
 from tests.check.roots import house_of, sign
@@ -38,7 +40,7 @@ def _marked(sort: str) -> list[pytest.MarkDecorator]:
     return [] if sort in QUICK_SORTS else [pytest.mark.long]
 
 
-SORTS = [pytest.param(sort, marks=_marked(sort)) for sort in FALSEHOODS]
+SORTS = [pytest.param(sort, marks=_marked(sort)) for sort in ROOTS]
 
 
 @pytest.fixture(scope="module")
@@ -57,8 +59,29 @@ def finished_root(tmp_path_factory: pytest.TempPathFactory) -> Root:
 
 @pytest.mark.parametrize("sort", SORTS)
 def test_a_true_root_is_clean(finished_root: Root, sort: str) -> None:
-    certificate = verify(finished_root(sort), all_pixels=True)
+    root = finished_root(sort)
+    certificate = verify(root, all_pixels=True, tracer=LightAgain(root))
     assert certificate.is_clean, certificate.text()
+
+
+def test_light_of_another_machine_is_not_traced_again(finished_root: Root, tmp_path: Path) -> None:
+    root = Path(shutil.copytree(finished_root("finished"), tmp_path / "root"))
+    tracer = LightAgain(root)
+    tracer.__dict__["variant"] = "cuda_of_another"
+    certificate = verify(root, sample=10, tracer=tracer)
+    assert "light traced" not in certificate.counts
+    assert any("this machine has cuda_of_another: not repeated" in n for n in certificate.notes)
+
+
+def test_verify_light_traces_the_light_of_a_folder(
+    finished_root: Root, capsys: pytest.CaptureFixture[str]
+) -> None:
+    root = finished_root("finished")
+    assert main(["verify", str(root), "--light", "--sample", "10"]) == 0
+    text = capsys.readouterr().out
+    assert "light traced" in text
+    assert "--light` traces it again" not in text
+    assert "--light` traces it again" in verify(root, sample=10).text()
 
 
 def test_a_certificate_lists_the_examined_files(finished_root: Root) -> None:
