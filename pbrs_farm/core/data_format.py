@@ -26,6 +26,9 @@ class DataFormat:
     suffixes: tuple[str, ...] = ()
     shared_suffixes: frozenset[str] = frozenset()
     contains: Pattern[bytes] | None = None  # in the first megabytes of such a file
+    lines: tuple[
+        bytes, ...
+    ] = ()  # beginnings of lines of the whole file, among which `contains` is sought instead
     keys: tuple[tuple[str, ...], ...] = ()  # all names of one of these occur in its JSON
     beside: tuple[str, ...] = ()  # patterns of names of files that lie beside one and are no homes
 

@@ -30,7 +30,7 @@ from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.usd import FORMAT as STAGE
 from pbrs_farm.read.usd import SUFFIXES
-from pbrs_farm.regular_files import fault_of, open_regular
+from pbrs_farm.regular_files import MAX_SCENE_BYTES, fault_of, open_regular
 
 _HEAD_BYTES: Final = 4 * 2**20
 _MOST_BYTES: Final = 2**40
@@ -134,8 +134,18 @@ class _Look:
             return False
         if self._suffix == ".json":
             return bool(entry.keys) and entry.has_keys(self._names)
-        is_shared = self._suffix in entry.shared_suffixes
-        return entry.is_sure_of(self._suffix, self._head if is_shared else b"")
+        if self._suffix not in entry.shared_suffixes:
+            return entry.is_sure_of(self._suffix, b"")
+        text = self._lines(entry.lines) if entry.lines else self._head
+        return entry.is_sure_of(self._suffix, text)
+
+    def _lines(self, beginnings: tuple[bytes, ...]) -> bytes:
+        """The lines of the file that begin so; a file beyond the limit of scenes has none."""
+        try:
+            with open_regular(self._path, MAX_SCENE_BYTES) as file:
+                return b"".join(line for line in file if line.startswith(beginnings))
+        except OSError:
+            return b""
 
     @cached_property
     def _names(self) -> set[str]:

@@ -15,7 +15,7 @@ from functools import partial
 from typing import TYPE_CHECKING, Final, NamedTuple, TypeAlias
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.catalogue import EMPTY, Catalogue
+from pbrs_farm.core.catalogue import EMPTY, FAMILIES_VERSION, Catalogue
 from pbrs_farm.core.house import House
 from pbrs_farm.core.made_home import VERSION as GENERATE_VERSION
 from pbrs_farm.core.plugins import marks_in_digest, plugins
@@ -189,8 +189,8 @@ def _dress_depends(source: SourceRef, recipe: Recipe) -> list[object]:
 
 
 def _repair_depends(_source: SourceRef, _recipe: Recipe) -> list[object]:
-    # Plugins may add ceiling lamps; without plugins the list is empty.
-    return [*marks_in_digest("furniture", plugins("furniture"))]
+    # Ceiling lamps are pieces of our families and of plugins.
+    return [FAMILIES_VERSION, *marks_in_digest("furniture", plugins("furniture"))]
 
 
 def _read(work: Preparation) -> Preparation:
@@ -330,7 +330,6 @@ PASSES: Final = (
     Pass("stand-ins", 4, _stand_in, _has_stand_ins, _stand_ins_depend),
     Pass("furnish", GENERATE_VERSION + _FURNISH_VERSION, _furnish, _is_furnished, _furnish_depends),
     Pass("dress", 14, _dress, _is_dressed, _dress_depends),
-    # Its version counts the generated ceiling lamps, too.
     Pass("repair", 5, _repair, _is_home, _repair_depends),
     Pass("open", 2, _leave_open, _stands_open, _open_depends),
     Pass("float", 2, _float, _has_floating_things, _float_depends),

@@ -14,6 +14,7 @@ import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import lru_cache
+from importlib.metadata import PackageNotFoundError, version
 from typing import Any, Final
 
 import numpy as np
@@ -108,6 +109,14 @@ def penetration_m(
     return float(max(0.0, -min((c.dist for c in state.contact[: state.ncon]), default=0.0)))
 
 
+def _version_of(package: str) -> str:
+    """The installed version; "" if it is not installed."""
+    try:
+        return version(package)
+    except PackageNotFoundError:
+        return ""
+
+
 @lru_cache(maxsize=256)
 def convex_parts_of(model: Model) -> tuple[F64, ...]:
     """Convex parts of a model, (V, 3) vertices each in its frame; cached in memory and on disk.
@@ -115,7 +124,8 @@ def convex_parts_of(model: Model) -> tuple[F64, ...]:
     CoACD may take a minute for a hollow model, so a terminal shows its name.
     """
     triangles = np.ascontiguousarray(model.shape.triangles, np.float64)
-    name = keys.sha256(triangles.tobytes() + _PARTS_FORMAT)[:32]
+    made_by = _PARTS_FORMAT + _version_of("coacd").encode()
+    name = keys.sha256(triangles.tobytes() + made_by)[:32]
     path = cache_folder() / "convex" / f"{name}.npz"
     try:
         with np.load(path) as arrays:

@@ -140,6 +140,16 @@ def test_an_outline_without_area_is_the_walls_rectangle(tmp_path: Path) -> None:
     assert not any(w.tops for w in plan_from_file(path).plan.walls)
 
 
+def test_a_floor_of_three_corners_is_a_room(tmp_path: Path) -> None:
+    ring: list[Place] = [(-2, -1.5), (2, -1.5), (-2, 1.5)]
+    sides = zip(ring, [*ring[1:], ring[0]], strict=True)
+    walls = [surface("wall", a, b, 0, 2.5) for a, b in sides]
+    plan = plan_from_file(scan(tmp_path, walls=walls, floors=[floor(ring)])).plan
+    assert len(plan.walls) == 3
+    (room,) = plan.rooms
+    assert room.area == pytest.approx(6, rel=0.1)
+
+
 def test_slopes_below_another_storey_are_a_note(tmp_path: Path) -> None:
     path = attic(tmp_path)
     value = json.loads(path.read_text())

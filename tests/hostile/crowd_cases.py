@@ -55,7 +55,7 @@ def _rooms_json(place: Place) -> list[Words]:
 
 
 def _extension() -> bytes:
-    return glb(lambda d: d.update(extensionsUsed=["EXT_mesh_gpu_instancing"]))
+    return glb(lambda d: d.update(extensionsUsed=["KHR_materials_sheen"]))
 
 
 def _suncg(n: int, place: Place) -> list[Words]:

@@ -142,7 +142,7 @@ def _storey_of_scan(path: Path, scan: _Scan, left_out: LeftOut, *, is_top: bool)
     outlines = [
         shape
         for k, f in enumerate(scan.floors, 1)
-        if len(f.polygonCorners or ()) >= 4
+        if len(f.polygonCorners or ()) >= 3
         and (shape := _outline_of_floor(path, f"floor {k}", f)).area >= 0.5
     ]
     lines += _lines_in_gaps(path, scan, lines)

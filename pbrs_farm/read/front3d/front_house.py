@@ -292,7 +292,10 @@ class _Structure:
                 )
             )
         if not rooms:
-            raise BadHouse(file, "scene.room", "no room has a mesh of the type Floor")
+            n_shafts = len(self._areas)
+            text = f"all {n_shafts} rooms are below {_LEAST_ROOM_M2} m2: shafts, not rooms"
+            text = text if n_shafts else "no room has a mesh of the type Floor"
+            raise BadHouse(file, "scene.room", text)
         check_unit(rooms, file, "mesh", "3D-FRONT is in metres")
         return rooms, parts
 

@@ -27,7 +27,8 @@ FORMAT = Format(
     kind="obj-home", title="OBJ", files=".obj", order=35,
     brings="what its groups are named", where="any modeller exports it", licence="of each home",
     suffixes=(".obj",), shared_suffixes=frozenset({".obj"}), beside=("*.mtl",),
-    # a floor and a wall among its groups; other files are single models
+    # a floor and a wall among its groups, wherever in the file; other files are single models
+    lines=(b"g ", b"o "),
     contains=re.compile(rb"\A(?=[\s\S]*^[go] .*floor)(?=[\s\S]*^[go] .*wall)", re.IGNORECASE | re.MULTILINE),
     read=_read_obj, companions=_companions_of_obj,
 )

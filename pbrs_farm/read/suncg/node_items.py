@@ -15,6 +15,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import MIRROR, NYU40_NAMES, OTHERPROP
 from pbrs_farm.core.house import Item, ItemKind, LightPart, Material, MaterialKind, Surface
+from pbrs_farm.home.names import words_of
 from pbrs_farm.read.common.arch_elements import Arch
 from pbrs_farm.read.common.model_cache import DamagedModel, ModelCache, ParsedModel
 from pbrs_farm.read.common.model_materials import ModelMaterials
@@ -26,7 +27,7 @@ from pbrs_farm.read.suncg.arch_json import arch_items
 from pbrs_farm.read.suncg.house_json import Node
 from pbrs_farm.read.suncg.lamp_lights import placed_light, separate_bulbs, with_emitting_bulbs
 from pbrs_farm.read.suncg.metadata import LampMaterials, ModelClass, Tables
-from pbrs_farm.read.suncg.mirror_glass import as_mirror, mirror_slot
+from pbrs_farm.read.suncg.mirror_glass import as_mirror, mirror_slot, mirror_slot_of_table
 
 _T = TypeVar("_T")
 
@@ -138,7 +139,10 @@ def _surfaces_and_bulbs(
     clear = MaterialKind.PANE if is_opening else MaterialKind.GLASS
     surfaces: list[Surface] = []
     bulbs: list[int] = []
-    glass = mirror_slot(model) if cls.nyu40 == MIRROR else None
+    if cls.nyu40 == MIRROR:
+        glass = mirror_slot(model)
+    else:
+        glass = mirror_slot_of_table(model, words_of(cls.name), cls.nyu40)
     for mesh, slot in zip(model.meshes, model.slots, strict=True):
         # Take the model's own material under what the node says of it.
         mtl = model.mtl[slot] if slot >= 0 else None

@@ -333,6 +333,14 @@ def test_a_million_entries_are_refused_quickly(tmp_path: Path) -> None:
     assert time.monotonic() - start < 20
 
 
+def test_a_home_of_shafts_alone_says_so(tmp_path: Path) -> None:
+    scene = files.front_house()
+    for model in scene["mesh"]:
+        model["xyz"] = [0.1 * x for x in model["xyz"]]
+    with pytest.raises(BadHouse, match=r"all \d rooms are below 0.5 m2: shafts, not rooms"):
+        read(written(tmp_path, scene))
+
+
 def test_a_door_in_no_hole_and_a_shaft_are_notes(tmp_path: Path) -> None:
     scene = files.front_house()
     plain = read(written(tmp_path, scene))

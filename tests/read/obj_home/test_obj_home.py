@@ -12,7 +12,7 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.prepare.read_source import read_house
-from pbrs_farm.prepare.source import resolve
+from pbrs_farm.prepare.source import resolve, words_of_homes
 from tests.inputs.obj_files import BOXES, write_obj_home
 from tests.inputs.pictures import picture
 
@@ -70,3 +70,15 @@ def test_a_single_model_is_no_home_and_named_so(tmp_path: Path) -> None:
     path.write_text("g floor_lamp\nv 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 3\n")
     with pytest.raises(BadHouse, match="pbrs-farm objects"):
         house(path)
+
+
+def test_groups_far_into_a_file_and_in_later_libraries_count(tmp_path: Path) -> None:
+    path = write_obj_home(tmp_path)
+    (tmp_path / "first.mtl").write_text("newmtl other\nKd 0 0 0\n")
+    text = path.read_text().replace("mtllib home.mtl", "mtllib first.mtl home.mtl")
+    path.write_text("# a long comment\n" * 300_000 + text)
+    assert words_of_homes([str(tmp_path)]) == [str(path)]
+    home = house(path)
+    desk = next(i for i in home.items if i.name == "desk")
+    red, green, blue = home.materials[desk.surfaces[0].material].diffuse
+    assert red > green > blue
