@@ -6,14 +6,15 @@ Links become nodes of one glTF scene for the reader of glTF. Both formats are z 
 from __future__ import annotations
 
 import posixpath
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from typing import Any, Final
 
 import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.house import House, Source
+from pbrs_farm.core.frames import transform_points
+from pbrs_farm.core.house import House, ItemKind, Source
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.format import GivenFile, root_of
 from pbrs_farm.read.common.name_classes import class_of_node_name
@@ -21,15 +22,16 @@ from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.gltf.assembly import Assembly, files_of_asset
-from pbrs_farm.read.gltf.document import UNREAD
+from pbrs_farm.read.gltf.document import UNREAD, placed_nodes
 from pbrs_farm.read.gltf.node_classes import Mapping, mapping_from_json
 from pbrs_farm.read.gltf.scene import house_of_gltf, side_files
-from pbrs_farm.read.robot.links import model_name, placed_links, roots_of_robot
+from pbrs_farm.read.robot.links import PLANE, model_name, placed_links, roots_of_robot, solid_roots
 from pbrs_farm.read.robot.sdf import SdfModel, models_of_sdf
-from pbrs_farm.read.robot.urdf import MAX_BYTES, Link, Robot, robot_from_urdf
+from pbrs_farm.read.robot.urdf import GREY, MAX_BYTES, Link, Robot, Solid, robot_from_urdf
 
 _Y_UP: Final = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 _MODELS: Final = (".glb", ".gltf", ".obj")
+_GROUND_M: Final = 0.1  # thickness of the floor made of a plane
 _MOST_JSON_BYTES: Final = 16 * 2**20
 
 
@@ -44,6 +46,7 @@ def read_robot(given: GivenFile, fields: ReadFields) -> House:
     scene = _Scene(Assembly(name, folder, fields.max_model_triangles), notes)
     for model in _models(folder, name, notes):
         scene.add(model)
+    scene.add_ground()
     scene.note_losses()
     parent, mapping = posixpath.dirname(name), Mapping()
     beside = [folder.name_from(parent, other) for other in side_files(given.path)]
@@ -94,11 +97,17 @@ class _Scene:
         self._missing: set[str] = set()
         self._foreign: set[str] = set()  # models in formats that are not read
         self._n_unread = 0
+        self._ground: float | None = None  # height of the highest plane, metres
+        self._has_floor = False
 
     def add(self, model: SdfModel) -> None:
         """Place a model, each of its items a node with the item's name."""
         robot = model.robot
         self._n_unread += robot.n_unread
+        for visual in (v for link in robot.links for v in link.visuals):
+            if visual.solid is not None and visual.solid.kind == PLANE:
+                height = float(model.world_from_model[2, 3] + visual.link_from_model[2, 3])
+                self._ground = height if self._ground is None else max(height, self._ground)
         node_of = placed_links(self.built, robot, self._roots_of(model.folder), {}, 1.0)
         nodes = self.built.document["nodes"]
         for light in model.lights:
@@ -113,6 +122,36 @@ class _Scene:
         self._name_items(robot, model.name, node_of)
         roots = roots_of_robot(robot, node_of)
         self.built.roots.append(self._turned(roots, model.world_from_model))
+
+    def add_ground(self) -> None:
+        """Add a floor below everything where a plane is the only floor: planes have no end."""
+        boxes = [] if self._ground is None or self._has_floor else list(self._boxes())
+        if not boxes:
+            return
+        low, high = np.min([b[0] for b in boxes], 0), np.max([b[1] for b in boxes], 0)
+        middle = np.eye(4)
+        middle[:3, 3] = [(low[0] + high[0]) / 2, self._ground, (low[2] + high[2]) / 2]
+        size = (float(high[0] - low[0]), _GROUND_M, float(high[2] - low[2]))
+        middle[1, 3] -= _GROUND_M / 2
+        row = {"name": "ground", "matrix": middle.T.ravel().tolist(), "extras": {"class": "floor"}}
+        nodes = self.built.document["nodes"]
+        row["children"] = solid_roots(self.built, Solid("box", size, GREY))
+        self.built.roots.append(len(nodes))
+        nodes.append(row)
+
+    def _boxes(self) -> Iterator[F64]:
+        """(2, 3) the box of each placed mesh, y up."""
+        gltf = self.built.gltf()
+        accessors = gltf.document.get("accessors", [])
+        for node in placed_nodes(gltf):
+            mesh = gltf.document["nodes"][node.index].get("mesh")
+            for row in [] if mesh is None else gltf.document["meshes"][mesh]["primitives"]:
+                bounds = accessors[row["attributes"]["POSITION"]]
+                if "min" in bounds and "max" in bounds:
+                    ends = zip(bounds["min"], bounds["max"], strict=True)
+                    corners = np.array(np.meshgrid(*ends, indexing="ij")).reshape(3, 8).T
+                    points = transform_points(node.world_from_node, corners)
+                    yield np.stack([points.min(0), points.max(0)])
 
     def note_losses(self) -> None:
         """Note the models that are missing or in other formats, and the shapes that are not read."""
@@ -156,6 +195,7 @@ class _Scene:
         for link in robot.links:
             below.setdefault(link.parent, []).append(link)
         waiting = list(below.get(None, []))
+        n_roots = len(below.get(None, []))
         while waiting:
             link = waiting.pop()
             parts = below.get(link.name, [])
@@ -163,10 +203,14 @@ class _Scene:
             if not link.visuals and not moves:
                 waiting += parts
                 continue
-            name = model or link.name
+            # Several bodies of a model are items with names of their own: the walls of a house.
+            is_own = not model or (n_roots > 1 and link.name != "link")
+            name = link.name if is_own else model
             files = [posixpath.basename(v.file).rpartition(".")[0] for v in link.visuals]
             words = [name, *(part.name for part in parts), *files]
             classified = next((w for w in words if class_of_node_name(w) is not None), name)
             node: dict[str, Any] = self.built.document["nodes"][node_of[link.name]]
             node["name"] = classified
+            kind = class_of_node_name(classified)
+            self._has_floor |= kind is not None and kind.kind is ItemKind.FLOOR
             node["extras"] |= {"one": True, "by_name": True, "item": name, "name": name}

@@ -21,6 +21,7 @@ from pbrs_farm.read.mesh.mtl import ObjMaterial
 from pbrs_farm.read.mesh.obj import Mesh
 from pbrs_farm.read.robot.urdf import Robot, Solid
 
+PLANE: Final = "plane"
 _ROUND: Final = 24  # segments around a round shape
 RootsOf = Callable[[str], "list[int] | None"]
 """A model as a robot's file names it -> its root nodes; None without the file."""
@@ -38,10 +39,12 @@ def placed_links(
     shown: dict[str, list[tuple[list[int], F64]]] = {}
     for link in robot.links:
         for visual in link.visuals:
-            if visual.solid is not None:
-                models = _solid_roots(built, visual.solid)
-            else:
+            if visual.solid is None:
                 models = roots_of(visual.file)
+            elif visual.solid.kind == PLANE:
+                continue  # the ground
+            else:
+                models = solid_roots(built, visual.solid)
             if models is not None:
                 shown.setdefault(link.name, []).append((models, visual.link_from_model))
     if not shown:
@@ -98,7 +101,7 @@ def files_of_robot(robot: Robot, folder: RootFolder, urdf: str, files: SourceFil
     return {name for model in existing for name in files_of_asset(folder, model, files)}
 
 
-def _solid_roots(built: Assembly, solid: Solid) -> list[int]:
+def solid_roots(built: Assembly, solid: Solid) -> list[int]:
     """The root nodes of a box, cylinder or ball."""
     origin, colour = np.zeros(3), ObjMaterial("solid", solid.rgba[:3], d=solid.rgba[3])
     if solid.kind == "box":

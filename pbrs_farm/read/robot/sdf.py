@@ -1,6 +1,7 @@
 """Parse a world or model of SDF: models as robots, lights, includes; effects: reads included files.
 
-A pose is relative to the model, a joint's to its child, unless `relative_to` names another frame.
+A pose is relative to the model, a joint's to its child, unless `relative_to` names another frame. The
+poses of models are those of the world's state, if it has one.
 """
 
 from __future__ import annotations
@@ -35,6 +36,11 @@ from pbrs_farm.read.robot.urdf import (
 _MODEL: Final = "__model__"
 _MOST_MODELS: Final = 20_000
 _MOST_DEPTH: Final = 20  # of includes, and of frames relative to others
+# of Gazebo's own library, which worlds do not bring along
+_GROUND: Final = (
+    b'<sdf><model name="ground_plane"><link name="link"><visual name="visual"><geometry><plane>'
+    b"<size>100 100</size></plane></geometry></visual></link></model></sdf>"
+)
 _ENDLESS: Final = 1e3  # limits beyond, radians or metres, are none
 _KINDS: Final = {
     "revolute": JointKind.REVOLUTE,
@@ -71,6 +77,10 @@ def models_of_sdf(folder: RootFolder, file: str, notes: Notes) -> Iterator[SdfMo
     root = parsed_xml(folder.read(file, max_bytes=MAX_BYTES) or b"", file, "sdf")
     n_models = 0
     for world in [*root.findall("world"), root]:
+        for state in world.findall("state/model"):
+            for row in world:
+                if _name_of(row) == state.get("name") and row.tag in ("model", "include"):
+                    _replace_pose(row, state.find("pose"))
         for model in _models_in(world, folder, file, notes, np.eye(4), 0):
             n_models += 1
             if n_models > _MOST_MODELS:
@@ -89,8 +99,8 @@ def _models_in(
     for row in parent:
         if row.tag not in ("model", "include"):
             continue
-        name = row.get("name") or row.findtext("name") or row.findtext("uri") or row.tag
-        place = f"{row.tag} {name.strip()[:60]}"
+        name = _name_of(row)
+        place = f"{row.tag} {name[:60]}"
         try:
             if depth > _MOST_DEPTH:
                 raise BadHouse(file, place, f"is nested more than {_MOST_DEPTH} deep")
@@ -104,6 +114,18 @@ def _models_in(
             notes.add("unreadable-model", place, f"{error.message[:200]}; it is left out")
 
 
+def _name_of(row: Element) -> str:
+    named = row.get("name") or row.findtext("name") or row.findtext("uri") or row.tag
+    return named.strip()
+
+
+def _replace_pose(row: Element, pose: Element | None) -> None:
+    if pose is not None:
+        for old in row.findall("pose"):
+            row.remove(old)
+        row.append(pose)
+
+
 def _included(
     row: Element, folder: RootFolder, file: str, notes: Notes, frame: F64, depth: int
 ) -> Iterator[SdfModel]:
@@ -112,17 +134,16 @@ def _included(
     if folder.has_folder(name) or not name.endswith(".sdf"):
         name = model_name(f"{uri.rstrip('/')}/model.sdf", folder, parent)
     data = folder.read(name, max_bytes=MAX_BYTES)
+    if data is None and uri == "model://ground_plane":
+        data = _GROUND
     if data is None:
-        notes.add("missing-model", f"include {uri[:80]}", "has no model here")
+        if uri != "model://sun":
+            notes.add("missing-model", f"include {uri[:80]}", "has no model here")
         return
     root, own_name = parsed_xml(data, name, "sdf"), (row.findtext("name") or "").strip()
     for model in root.findall("model")[:1]:
         model.set("name", own_name or str(model.get("name")))
-        pose = row.find("pose")
-        if pose is not None:
-            for old in model.findall("pose"):
-                model.remove(old)
-            model.append(pose)
+        _replace_pose(model, row.find("pose"))
     yield from _models_in(root, folder, name, notes, frame, depth + 1)
 
 

@@ -23,6 +23,7 @@ _SOLIDS: Final = {
     "box": (("size", 3),),
     "cylinder": (("radius", 1), ("length", 1)),
     "sphere": (("radius", 1),),
+    "plane": (("size", 2),),
 }  # solid -> its fields, each with its number of values
 _KINDS: Final = {
     "revolute": JointKind.REVOLUTE,
@@ -33,9 +34,9 @@ _KINDS: Final = {
 
 @dataclass(frozen=True, slots=True)
 class Solid:
-    """A shape without a file, about its middle; a cylinder is along z."""
+    """A shape without a file, about its middle; a cylinder is along z, a plane across it."""
 
-    kind: str  # box, cylinder or sphere
+    kind: str  # box, cylinder, sphere or plane
     size: tuple[float, ...]  # metres: sides, radius and length, or radius
     rgba: tuple[float, float, float, float]  # sRGB-encoded
 
@@ -86,7 +87,7 @@ class Robot:
 
     links: tuple[Link, ...]
     moving: tuple[str, ...] = ()  # names of joints that are not fixed, in the file's order
-    n_unread: int = 0  # skipped shapes: planes, capsules, height maps
+    n_unread: int = 0  # skipped shapes: capsules, height maps
 
     def values(self, pose: Any, file: str, place: str, order: str = "") -> dict[str, float]:
         """Joint values by name, radians or metres, from a Habitat scene.

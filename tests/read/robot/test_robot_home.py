@@ -113,3 +113,27 @@ def test_a_single_robot_is_no_home(tmp_path: Path) -> None:
     path.write_text(f'<robot name="arm"><link name="base">{box}</link></robot>')
     with pytest.raises(BadHouse, match="has no floor"):
         house(path)
+
+
+def test_walls_of_one_model_on_a_plane_are_a_room(tmp_path: Path) -> None:
+    """A house drawn in Gazebo: links of one model, the ground of Gazebo's library, a state."""
+    walls = ""
+    for name, (middle, size) in BOXES.items():
+        if name.startswith("wall"):
+            box = f"<geometry><box><size>{size[0]} {size[1]} {size[2]}</size></box></geometry>"
+            place = f"<pose>{middle[0]} {middle[1]} {middle[2]} 0 0 0</pose>"
+            walls += f'<link name="{name}">{place}<visual name="v">{box}</visual></link>'
+    path = tmp_path / "house.world"
+    path.write_text(
+        '<sdf version="1.6"><world name="default"><include><uri>model://sun</uri></include>'
+        "<include><uri>model://ground_plane</uri></include>"
+        f'<model name="my_house"><pose>9 9 0 0 0 0</pose>{walls}</model><state world_name="default">'
+        '<model name="my_house"><pose>1 0 0 0 0 0</pose></model></state></world></sdf>'
+    )
+    home = house(path)
+    assert home.notes == ()
+    assert {i.name for i in home.items} == {"ground", *(n for n in BOXES if n.startswith("wall"))}
+    (room,) = home.rooms
+    assert room.polygon.min(0) == pytest.approx([1, -3], abs=0.01)
+    assert room.polygon.max(0) == pytest.approx([5, 0], abs=0.01)
+    assert room.floor_y == pytest.approx(0, abs=1e-6)
