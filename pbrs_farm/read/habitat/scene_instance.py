@@ -159,6 +159,7 @@ class _Dataset:
         for name in self._files:
             self._by_name.setdefault(posixpath.basename(name), name)
         self._classes: dict[str, str] | None = None
+        self._handles_of: dict[str, dict[str, None]] = {}  # kind -> names of templates
 
     def named(self, pattern: str) -> list[str]:
         """Files whose name fits a pattern."""
@@ -178,10 +179,14 @@ class _Dataset:
         """Fields of a template, and the file that its paths are relative to; None if it is unknown.
 
         A template is an entry of `configs` in the data set's configuration, a config file, whose folders
-        may be left out, or a model without a config. The data set's default attributes come first.
+        may be left out, or a model without a config. The data set's default attributes come first. As
+        in Habitat, a part of a name is enough.
         """
         self.folder.name_from("", name)  # a name that leads out is refused
         base, defaults = _base_name(name, kind), dict[str, Any]()
+        handles = self._handles(kind)
+        if base and base not in handles and self._template_of_file(base, kind) is None:
+            base = next((handle for handle in handles if base in handle), base)
         for config in self.configs:
             section = object_at(self.json(config), _SECTIONS[kind])
             defaults = defaults | object_at(section, "default_attributes")
@@ -195,6 +200,21 @@ class _Dataset:
                 return defaults | fields | object_at(row, "attributes"), file
         known = self._template_of_file(base, kind)
         return known and (defaults | known[0], known[1])
+
+    def _handles(self, kind: str) -> dict[str, None]:
+        """The names of all templates of a kind that have a config, in order."""
+        if kind not in self._handles_of:
+            names = [n.removesuffix(f".{kind}_config.json") for n in self._by_name]
+            names = [
+                _base_name(n, kind) for n, m in zip(names, self._by_name, strict=True) if n != m
+            ]
+            for config in self.configs:
+                rows = object_at(self.json(config), _SECTIONS[kind]).get("configs", [])
+                for row in rows if isinstance(rows, list) else []:
+                    named = row.get("template_handle") if isinstance(row, dict) else None
+                    names += [_base_name(named, kind)] if isinstance(named, str) else []
+            self._handles_of[kind] = dict.fromkeys(sorted(names))
+        return self._handles_of[kind]
 
     def _template_of_file(self, name: str, kind: str) -> tuple[dict[str, Any], str] | None:
         base = _base_name(name, kind)

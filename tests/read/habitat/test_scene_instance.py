@@ -170,6 +170,15 @@ def test_templates_within_the_configuration_of_the_data_set_are_found(tmp_path: 
     assert resolve(str(path)).fingerprint != before
 
 
+def test_a_part_of_the_name_of_a_template_is_enough(tmp_path: Path) -> None:
+    row = {"template_name": "b1", "translation": [2, 0.3, 1.5], "translation_origin": "COM"}
+    path = dataset(tmp_path, object_instances=[row])
+    found = house(path)
+    assert not [n for n in found.notes if n.kind == "missing-model"]
+    whole = house(dataset(tmp_path, object_instances=[row | {"template_name": "ab12"}]))
+    assert [i.bounds.tolist() for i in found.items] == [i.bounds.tolist() for i in whole.items]
+
+
 def test_one_damaged_object_is_left_out_with_a_note(tmp_path: Path) -> None:
     good = {"template_name": "ab12", "translation": [2, 0.3, 1.5], "translation_origin": "COM"}
     damaged = [{"template_name": "broken"}, good | {"translation": [1, None, 2]}]
