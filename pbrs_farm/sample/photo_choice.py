@@ -45,7 +45,7 @@ _TRIES: Final = 12
 _ROUNDS: Final = 3
 """Maximum exchanges of a view for another one of its sector."""
 
-MOST_WORSE: Final = 0.35
+MOST_WORSE: Final = 0.7
 """Maximum difference to its sector's best score for a view chosen by likeness."""
 
 _LIKELY_BY_SCORE: Final = 8

@@ -15,7 +15,7 @@ from typing import Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32
+from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.classes import NYU13_NAMES
 from pbrs_farm.core.house import Geometry, House, Room
@@ -32,6 +32,7 @@ from pbrs_farm.sample.photo_score import (
     cut_shares,
     foreground_cost,
     framing_cost,
+    furniture_points,
     item_roles,
     photo_score,
     photo_shares,
@@ -100,7 +101,8 @@ class PhotoSampler:
         cameras = candidates.cameras(which, self._intrinsics(*size))
         small = [camera.with_size(*depth_size) for camera in cameras]
         depth, seen_items = self.pictures_of(small)
-        shares = self._shares(cameras, depth, seen_items)
+        cut = cut_shares(small, depth, seen_items, self._roles, self._points)
+        shares = self._shares(cameras, depth, cut)
         # Used to find near-duplicates.
         if depth_size == DEPTH_SIZE:
             names = [(placed.room.id, int(k)) for k in which]
@@ -166,6 +168,10 @@ class PhotoSampler:
         return item_roles(self.house)
 
     @cached_property
+    def _points(self) -> list[F64]:
+        return furniture_points(self.house)
+
+    @cached_property
     def _limits(self) -> EnclosureLimits:
         return enclosure_limits(self.house)
 
@@ -186,14 +192,11 @@ class PhotoSampler:
             return self._sizes
         return (width, height), _TINY_DEPTH_SIZE
 
-    def _shares(
-        self, cameras: list[Camera], depth: F32, seen_items: NDArray[np.uint32]
-    ) -> PhotoShares:
-        """Class shares in pictures of these cameras. depth, seen_items: (N, H, W) small ones of them."""
+    def _shares(self, cameras: list[Camera], depth: F32, cut: tuple[F64, F64]) -> PhotoShares:
+        """Class shares in pictures of these cameras. depth: (N, H, W) of small ones; cut: of cut_shares."""
         rows = [part for _which, part in count_items(self.counter, cameras, self._n_items)]
         counts = np.concatenate([np.zeros((0, self._n_items + 1), np.uint32), *rows])
         flat = depth.reshape(len(cameras), depth.shape[1] * depth.shape[2])
-        cut = cut_shares(depth, seen_items, self._roles)
         return photo_shares(counts, flat, self._roles, self.fields.min_object_fraction, cut)
 
     def _intrinsics(self, width_px: int, height_px: int) -> Intrinsics:

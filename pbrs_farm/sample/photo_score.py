@@ -7,6 +7,7 @@ fitted by eye on the example homes to the class shares of NYUv2's photographs.
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Final, NamedTuple
 
@@ -14,16 +15,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, F64, I64, Bools
+from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.classes import (
     BLINDS,
     CURTAIN,
     DOOR,
+    FLOOR_MAT,
     NYU13_FROM_NYU40,
     NYU13_NAMES,
     OTHERSTRUCTURE,
     WINDOW,
 )
 from pbrs_farm.core.house import House, Item, ItemKind
+from pbrs_farm.geometry.surface_points import item_triangles, surface_points
 
 # NYU40 classes of what hangs at openings or is built in: no furniture.
 NO_FURNITURE: Final = (BLINDS, CURTAIN, OTHERSTRUCTURE)
@@ -63,9 +67,14 @@ FOREGROUND: Final = (
 )
 """Costs of close objects; all of them are added."""
 
-# An item that the picture's edge cuts, seen nearer than CUT_NEARER_M, costs from CUT_FREE of the picture
-# on: a photographer steps aside. At most CUT_MOST: enough to leave a view out that is not its room's best.
-CUT_NEARER_M, CUT_FREE, CUT_COST, CUT_MOST = 1.0, 0.12, 20.0, 1.5
+# Furniture that the picture's edge cuts: a photographer steps aside or back. Its share of the picture is weighted
+# by the part of its surface outside the picture beyond CUT_AWAY, so that large pieces mostly inside cost nothing.
+CUT_AWAY, CUT_FREE, CUT_COST = 0.25, 0.03, 6.0
+# The largest item cut nearer than CLOSE_CUT_M costs by its whole share, at most CUT_MOST: enough to leave a view
+# out that is not its room's best.
+CLOSE_CUT_M, CLOSE_CUT_FREE, CLOSE_CUT_COST, CUT_MOST = 1.0, 0.12, 20.0, 1.5
+_LEAST_CUT: Final = 0.01  # share of the picture; smaller pieces do not count as cut
+_SPACINGS: Final = 10  # of the points on an item's surface, along its longest extent
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -88,9 +97,9 @@ class PhotoShares:
     """Contents of N pictures, as shares of the picture; each array (N,) except for the last two.
 
     largest: of the largest piece of furniture. wall: of the largest wall. n_objects: pieces that cover the
-    minimum share. n_classes: visible NYU13 classes. median_m: median planar depth. cut: of the largest
-    close item that the edge cuts. foreground: (N, K) of objects closer than each row of FOREGROUND. nyu13: (N, 14) of each class, column 0 of unclassified
-    pixels.
+    minimum share. n_classes: visible NYU13 classes. median_m: median planar depth. cut, close_cut: of
+    cut_shares. foreground: (N, K) of objects closer than each row of FOREGROUND. nyu13: (N, 14) of each
+    class, column 0 of unclassified pixels.
     """
 
     furniture: F64
@@ -102,6 +111,7 @@ class PhotoShares:
     n_classes: I64
     median_m: F64
     cut: F64
+    close_cut: F64
     foreground: F64
     nyu13: F64
 
@@ -123,15 +133,20 @@ def item_roles(house: House) -> ItemRoles:
 
 
 def photo_shares(
-    counts: NDArray[np.uint32], depth_m: F32, roles: ItemRoles, least: float, cut: F64 | None = None
+    counts: NDArray[np.uint32],
+    depth_m: F32,
+    roles: ItemRoles,
+    least: float,
+    cut: tuple[F64, F64] | None = None,
 ) -> PhotoShares:
     """Contents of each picture.
 
     counts: (N, n_items + 1) pixels of each instance. depth_m: (N, K) planar depth at K pixels spread over
-    the picture, 0 = nothing. least: minimum share of the picture for an object. cut: (N,) of
-    cut_shares; None = nothing is cut.
+    the picture, 0 = nothing. least: minimum share of the picture for an object. cut: of cut_shares;
+    None = nothing is cut.
     """
     # Turn pixels into shares, of instances and of classes.
+    all_cut, close_cut = cut or (np.zeros(len(counts)), np.zeros(len(counts)))
     pixels = np.maximum(counts.sum(1, dtype=np.int64), 1)
     share = counts / pixels[:, None]
     classes = np.stack([share[:, roles.nyu13 == k].sum(1) for k in range(len(NYU13_NAMES))], 1)
@@ -144,7 +159,8 @@ def photo_shares(
         n_objects=(share[:, roles.furniture] >= least).sum(1),
         n_classes=(classes[:, 1:] >= LEAST_CLASS_SHARE).sum(1),
         median_m=_median_depth(depth_m),
-        cut=np.zeros(len(counts)) if cut is None else cut,
+        cut=all_cut,
+        close_cut=close_cut,
         foreground=np.stack(
             [
                 ((depth_m > 0) & (depth_m < f.nearer_m)).sum(1) / max(depth_m.shape[1], 1)
@@ -156,25 +172,59 @@ def photo_shares(
     )
 
 
-def cut_shares(depth_m: F32, seen_items: NDArray[np.uint32], roles: ItemRoles) -> F64:
-    """(N,) share of each picture of the largest item that its edge cuts close to the lens; 0 without any.
+def furniture_points(house: House) -> list[F64]:
+    """Points on the surface of each instance that can be cut, (K, 3) in the world; none on rugs and structure."""
+    none = np.zeros((0, 3))
+    points = [none]
+    for item in house.items:
+        is_framed = _is_furniture(item) and item.nyu40 != FLOOR_MAT and item.n_faces > 0
+        spacing = float(np.ptp(item.bounds, axis=0).max()) / _SPACINGS if is_framed else 0.0
+        points.append(surface_points(item_triangles(item), spacing) if spacing > 0 else none)
+    return points
 
-    depth_m, seen_items: (N, H, W) planar depth and instance id at each pixel, 0 = nothing. Walls, floors
-    and other structure do not count.
+
+def cut_shares(
+    cameras: Sequence[Camera],
+    depth_m: F32,
+    seen_items: NDArray[np.uint32],
+    roles: ItemRoles,
+    points: Sequence[F64],
+) -> tuple[F64, F64]:
+    """(N,) share of each picture of furniture that its edge cuts, and (N,) of the largest close item cut.
+
+    The first is a sum of shares, each weighted by the part of the item outside the picture. depth_m,
+    seen_items: (N, H, W) planar depth and instance id at each pixel, 0 = nothing. points: of
+    furniture_points.
     """
     n, height, width = seen_items.shape
     if not n:
-        return np.zeros(0)
-    n_ids, picture = len(roles.nyu13), np.arange(n)[:, None, None]
-    name = picture * n_ids + seen_items  # of each item in each picture
-    size = n * n_ids
-    share = np.bincount(name.ravel(), minlength=size) / max(height * width, 1)
-    is_close, is_at_edge = np.zeros(size, np.bool_), np.zeros(size, np.bool_)
-    is_close[name[(depth_m > 0) & (depth_m < CUT_NEARER_M)]] = True
+        return np.zeros(0), np.zeros(0)
+    n_ids = len(roles.nyu13)
+    name = np.arange(n)[:, None, None] * n_ids + seen_items  # of each item in each picture
+    share = np.bincount(name.ravel(), minlength=n * n_ids) / max(height * width, 1)
+    is_close = np.zeros(n * n_ids, np.bool_)
+    is_close[name[(depth_m > 0) & (depth_m < CLOSE_CUT_M)]] = True
+    is_at_edge = np.zeros(n * n_ids, np.bool_)
     for edge in (name[:, 0], name[:, -1], name[:, :, 0], name[:, :, -1]):
         is_at_edge[edge] = True
-    is_cut = (is_close & is_at_edge).reshape(n, n_ids) & ~roles.structure
-    return np.asarray(np.where(is_cut, share.reshape(n, n_ids), 0).max(1, initial=0))
+    is_cut = (is_at_edge & (share >= _LEAST_CUT)).reshape(n, n_ids) & ~roles.structure
+    share = share.reshape(n, n_ids)
+    close = np.where(is_cut & is_close.reshape(n, n_ids), share, 0).max(1, initial=0)
+    cut = np.zeros(n)
+    for picture, item in np.argwhere(is_cut).tolist():
+        if len(points[item]):
+            away = 1 - _part_inside(cameras[picture], points[item])
+            cut[picture] += share[picture, item] * max(away - CUT_AWAY, 0.0) / (1 - CUT_AWAY)
+    return cut, np.asarray(close)
+
+
+def _part_inside(camera: Camera, points: F64) -> float:
+    """The part of points (K, 3) inside the picture, hidden or not."""
+    i = camera.intrinsics
+    local = (points - camera.eye) @ camera.world_from_camera[:3, :3]
+    z = np.maximum(-local[:, 2], 0)
+    x, y = i.cx * z + i.fx * local[:, 0], i.cy * z - i.fy * local[:, 1]
+    return float(((x > 0) & (x < i.width_px * z) & (y > 0) & (y < i.height_px * z)).mean())
 
 
 def _median_depth(depth_m: F32) -> F64:
@@ -203,7 +253,7 @@ def photo_score(shares: PhotoShares) -> F64:
     score -= OPENING_COST * np.maximum(shares.opening - MOST_OPENING, 0)
     score -= np.maximum(shares.largest - MOST_OF_ONE, 0)
     score -= np.maximum(shares.wall - MOST_OF_A_WALL, 0)
-    score -= np.minimum(CUT_COST * np.maximum(shares.cut - CUT_FREE, 0), CUT_MOST)
+    score -= np.minimum(CLOSE_CUT_COST * np.maximum(shares.close_cut - CLOSE_CUT_FREE, 0), CUT_MOST)
     # Prefer the distance across a room.
     score -= NEAR_COST * np.maximum(NEAR_M - shares.median_m, 0)
     score -= FAR_COST * np.maximum(shares.median_m - FAR_M, 0)
@@ -219,9 +269,13 @@ def framing_cost(shares: PhotoShares, tilt_deg: F64) -> F64:
 
 
 def foreground_cost(shares: PhotoShares) -> F64:
-    """(N,) total cost of objects close to the lens, by FOREGROUND; it is subtracted from a view's score."""
+    """(N,) total cost of objects close to the lens, by FOREGROUND, and of furniture cut by the edge.
+
+    It is subtracted from a view's score, but rejects no view.
+    """
     nearer = zip(FOREGROUND, shares.foreground.T, strict=True)
     costs = [f.cost * np.maximum(share - f.free, 0) for f, share in nearer]
+    costs.append(CUT_COST * np.maximum(shares.cut - CUT_FREE, 0))
     return np.asarray(np.sum(costs, axis=0))
 
 

@@ -85,7 +85,7 @@ def test_without_likeness_the_best_score_is_chosen() -> None:
 
 
 def test_a_much_better_view_is_taken_despite_its_contents() -> None:
-    rows = [(0, 1.3, WALLS), (0, 1.3 - MOST_WORSE - 0.01, LIKE_ALL)]
+    rows = [(0, 2.0, WALLS), (0, 2.0 - MOST_WORSE - 0.01, LIKE_ALL)]
     assert chosen(room(rows), likeness=50.0) == {("0_0", 0): [0]}
 
 
@@ -130,7 +130,7 @@ def test_a_view_past_a_lampshade_yields_to_an_unobstructed_one_of_its_sector() -
         assert chosen(room(rows), likeness=likeness)["0_0", 0] == [0]
         assert chosen(room(rows, foreground=0.3), likeness=likeness)["0_0", 0] == [1]
     # The unobstructed view may be below the threshold of the better score.
-    rows[1] = (0, 1.3 - MOST_WORSE - 0.05, LIKE_ALL)
+    rows = [(0, 2.0, LIKE_ALL), (0, 2.0 - MOST_WORSE - 0.05, LIKE_ALL)]
     assert chosen(room(rows, foreground=1.0), likeness=2.0)["0_0", 0] == [1]
 
 

@@ -28,6 +28,7 @@ from pbrs_farm.sample.photo_score import (
     cut_shares,
     foreground_cost,
     framing_cost,
+    furniture_points,
     item_roles,
     photo_score,
     photo_shares,
@@ -62,7 +63,7 @@ def shares(**changes: float) -> PhotoShares:
     """A good view of one room with some shares changed."""
     plain = {
         "furniture": 0.4, "opening": 0.05, "largest": 0.2, "wall": 0.3, "floor": 0.1,
-        "n_objects": 5, "n_classes": 6, "median_m": 2.5, "cut": 0.0,
+        "n_objects": 5, "n_classes": 6, "median_m": 2.5, "cut": 0.0, "close_cut": 0.0,
     }  # fmt: skip
     columns = {k: np.array([v]) for k, v in (plain | changes).items()}
     near = np.zeros((1, len(FOREGROUND)))
@@ -103,18 +104,39 @@ def test_objects_before_the_lens_cost_more_the_nearer_they_are() -> None:
 
 def test_a_close_item_that_the_edge_cuts_costs_by_its_share_of_the_picture() -> None:
     house = room_house([box((0, 0, 0), (1, 1, 1)), *shell(3, 3)], 3, 3)
-    roles = item_roles(house)
+    roles, points = item_roles(house), furniture_points(house)
     wall = 1 + next(k for k, i in enumerate(house.items) if i.kind is ItemKind.WALL)
     # Four pictures of a box: at the edge and close, at the edge and far, in the middle and close, and a
-    # close wall in its place.
+    # close wall in its place. The whole box is inside each.
+    camera = Camera.look(
+        Intrinsics.from_hfov(10, 10, 1.0), np.array((0, 0.5, 4)), np.array((0.0, 0, -1))
+    )
     items, depth = np.zeros((4, 10, 10), np.uint32), np.full((4, 10, 10), 3.0, np.float32)
     items[:2, :5, :4], items[2, 3:7, 3:8], items[3, :5, :4] = 1, 1, wall
     depth[0, 4, 3], depth[2, 3:7, 3:8], depth[3, :5, :4] = 0.9, 0.9, 0.9
-    cut = cut_shares(depth, items, roles)
-    assert cut.tolist() == [0.2, 0, 0, 0]
-    assert photo_score(shares(cut=0.2))[0] < photo_score(shares())[0] - MOST_WORSE
-    assert photo_score(shares(cut=0.05))[0] == photo_score(shares())[0]
-    assert cut_shares(depth[:0], items[:0], roles).shape == (0,)
+    cut, close_cut = cut_shares([camera] * 4, depth, items, roles, points)
+    assert close_cut.tolist() == [0.2, 0, 0, 0]
+    assert cut.tolist() == [0, 0, 0, 0]
+    assert photo_score(shares(close_cut=0.2))[0] < photo_score(shares())[0] - MOST_WORSE
+    assert photo_score(shares(close_cut=0.05))[0] == photo_score(shares())[0]
+    empty, close_empty = cut_shares([], depth[:0], items[:0], roles, points)
+    assert empty.shape == close_empty.shape == (0,)
+
+
+def test_furniture_costs_by_its_part_outside_the_picture_at_any_distance() -> None:
+    house = room_house([box((4, 0, 0), (5, 1, 1)), *shell(9, 9)], 9, 9)
+    lens = Intrinsics.from_hfov(40, 30, 1.0)
+    # From 3 m: the box in the middle, a fifth of it outside, half of it, nearly all.
+    xs = (4.5, 5.7, 6.13, 6.7)
+    cameras = [Camera.look(lens, np.array((x, 0.5, 3.5)), np.array((0.0, 0, -1))) for x in xs]
+    depth, items = Caster(geometry_from_house(house)).item_pictures(cameras)
+    cut, close_cut = cut_shares(cameras, depth, items, item_roles(house), furniture_points(house))
+    assert (close_cut == 0).all()
+    assert cut[:2].tolist() == [0, 0]
+    assert 0.2 < cut[2] / (items[2] == 1).mean() < 0.45
+    assert cut[3] / (items[3] == 1).mean() > 0.7
+    assert foreground_cost(shares(cut=0.2))[0] > MOST_WORSE
+    assert foreground_cost(shares(cut=0.03))[0] == 0
 
 
 def test_doors_curtains_and_built_in_parts_are_no_furniture() -> None:
