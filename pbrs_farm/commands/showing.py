@@ -5,6 +5,7 @@ from __future__ import annotations
 import argparse
 import os
 from dataclasses import replace
+from getpass import getuser
 from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
@@ -83,6 +84,11 @@ def _farm(store_url: str) -> LiveFarm | None:
 def _say(options: BoardOptions, token: Secret, *, is_own_token: bool) -> None:
     host = f"[{options.host}]" if ":" in options.host else options.host
     echo(f"http://{host}:{options.port}/")
+    # SSH_CONNECTION: address and port of the client, then those of this machine
+    connection = os.environ.get("SSH_CONNECTION", "").split()
+    if options.is_private and len(connection) == 4:
+        tunnel = f"ssh -L {options.port}:{host}:{options.port} {getuser()}@{connection[2]}"
+        echo(f"from your machine: {tunnel}, then http://127.0.0.1:{options.port}/ there")
     if is_own_token and not (options.is_readonly and options.is_private):
         echo(f"token: {token.reveal()}")
     if not options.is_private:

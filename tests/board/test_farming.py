@@ -72,6 +72,9 @@ def do(client: httpx.Client, what: str, of: str, **more: str) -> httpx.Response:
 
 def test_jobs_and_workers_are_listed_with_their_tasks(client: httpx.Client, drive: Drive) -> None:
     html = client.get("/farm").text
+    now = client.get("/farm?format=json").json()
+    assert [row["job"] for row in now["jobs"]] == [drive.job.job_id]
+    assert len(now["workers"]) == 1
     assert drive.job.job_id in html
     assert "h2/-/geometry" in html
     assert "w1" in html

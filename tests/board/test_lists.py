@@ -6,7 +6,9 @@ import asyncio
 import gzip
 import html
 import json
+import re
 import shutil
+import socket
 import struct
 from collections.abc import Iterator
 from pathlib import Path
@@ -15,6 +17,7 @@ import httpx
 import numpy as np
 import pytest
 
+import pbrs_farm
 from pbrs_farm.board.board_state import new_board
 from pbrs_farm.board.index.house_rows import HouseRow, ViewRow
 from pbrs_farm.board.index.queries import Queries, filter_from_query, page_number
@@ -24,8 +27,11 @@ from pbrs_farm.board.index.view_index import ViewIndex
 from pbrs_farm.board.options import BoardOptions
 from pbrs_farm.board.pages.words import OF_A_CANDIDATE, OF_A_SELECTION, OF_A_VIEW
 from pbrs_farm.board.root_reader import RootReader
-from pbrs_farm.board.serve import application
+from pbrs_farm.board.serve import application, bound_socket
+from pbrs_farm.cli import main
 from pbrs_farm.core import keys
+from pbrs_farm.core.camera import Camera
+from pbrs_farm.core.frames import opencv_world_from_camera
 from pbrs_farm.core.keys import canonical_json
 from pbrs_farm.curate.teaching_rules import REASONS as RULE_REASONS
 from pbrs_farm.images import array_from_png, decode_photo
@@ -74,6 +80,107 @@ def test_a_filter_in_the_address_selects_the_listed_views(
     html = client.get(f"/views?{query}").text
     assert f"<h1>{n} view" in html
     assert html.count('class="card"') == n
+
+
+def test_lists_are_json_on_request(client: httpx.Client) -> None:
+    homes = client.get("/?format=json&words=a-1").json()
+    assert homes == {
+        "page": 1,
+        "n_pages": 1,
+        "n_rows": 1,
+        "rows": [
+            {
+                "house": "a-1",
+                "name": "Home a-1",
+                "credit": "by A. Person",
+                "n_rooms": 2,
+                "n_views": 3,
+                "n_warned": 0,
+                "best_view": "0_0_1",
+            }
+        ],
+    }
+    accept = {"Accept": "application/json"}
+    views = client.get("/views?room=Bath", headers=accept).json()
+    assert views["n_rows"] == 1
+    (view,) = views["rows"]
+    assert (view["house"], view["view"], view["verdict"]) == ("a-1", "0_1_0", "unjudged")
+    assert {"mlt_il_ol", "depth", "radiance"} <= set(view["layers"])
+    home = client.get("/homes/a-1", headers=accept).json()
+    assert [row["view"] for row in home["views"]] == ["0_0_1", "0_0_2", "0_1_0"]
+    browser = {"Accept": "text/html,application/json;q=0.9"}
+    assert "<html" in client.get("/views", headers=browser).text
+
+
+def test_a_views_camera_is_python_to_paste(tmp_path: Path) -> None:
+    camera = Camera.look_at((1, 1.5, 2), (3, 1, 2.5), size=(WIDTH, HEIGHT), hfov_deg=70)
+    facts = {
+        "K": camera.intrinsics.k.tolist(),
+        "world_from_camera_opencv": opencv_world_from_camera(camera.world_from_camera).tolist(),
+    }
+    root = write_root(tmp_path / "root", {"a-1": ("0_0_1",)})
+    write_view(root / "houses/a-1/views/0_0_2", **facts)
+    write_view(root / "houses/a-1/views/0_0_3", **facts | {"lens": {"model": "fisheye"}})
+    write_view(root / "houses/a-1/views/0_0_4", **facts | {"K": "__import__"})
+    with served(str(root), tmp_path / "cache") as client:
+        pages = [client.get(f"/homes/a-1/views/0_0_{k}").text for k in range(1, 5)]
+    assert ["Copy this camera" in page for page in pages] == [False, True, False, False]
+    (text,) = re.findall(r'id="camera">(.+?)</pre>', pages[1])
+    pasted = eval(html.unescape(text), {"pf": pbrs_farm})
+    np.testing.assert_allclose(pasted.world_from_camera, camera.world_from_camera, atol=1e-12)
+    np.testing.assert_allclose(pasted.intrinsics.k, camera.intrinsics.k)
+
+
+def test_the_card_of_a_home_shows_the_view_with_the_best_score(tmp_path: Path) -> None:
+    root = write_root(tmp_path / "root", {"a-1": ()})
+    for view, facts in {
+        "0_0_1": {"score": 0.2},
+        "0_0_2": {"score": 0.7},
+        "0_0_3": {"score": 0.9, "warnings": ["dark"]},
+        "0_0_4": {"score": "9"},
+    }.items():
+        write_view(root / "houses/a-1/views" / view, **facts)
+    home = read_queries(root, tmp_path).home("a-1")
+    assert home is not None
+    assert home.cover is not None
+    assert home.cover.id == "0_0_2"
+
+
+@pytest.mark.parametrize(
+    ("host", "connection", "hint"),
+    [
+        ("127.0.0.1", "192.0.2.7 50000 192.0.2.9 22", "ssh -L 8080:127.0.0.1:8080 ann@192.0.2.9"),
+        ("127.0.0.1", "", ""),
+        ("192.0.2.9", "192.0.2.7 50000 192.0.2.9 22", ""),
+    ],
+)
+def test_over_ssh_the_board_says_how_to_reach_it(
+    host: str,
+    connection: str,
+    hint: str,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
+) -> None:
+    class Server:
+        def run(self, sockets: list[socket.socket]) -> None:
+            sockets[0].close()
+
+    ports: list[int] = []
+
+    def bound(_host: str, _port: int) -> socket.socket:
+        listening = bound_socket("127.0.0.1", 0)
+        ports.append(listening.getsockname()[1])
+        return listening
+
+    monkeypatch.setattr("pbrs_farm.board.serve.bound_socket", bound)
+    monkeypatch.setattr("pbrs_farm.board.serve.server_of", lambda _board: Server())
+    monkeypatch.setattr("pbrs_farm.commands.showing.getuser", lambda: "ann")
+    monkeypatch.setenv("SSH_CONNECTION", connection)
+    assert main(["board", str(tmp_path), "--host", host, "--cache", str(tmp_path / "cache")]) == 0
+    said = capsys.readouterr().out
+    assert ("ssh -L" in said) == bool(hint)
+    assert hint.replace("8080", str(ports[0])) in said
 
 
 def test_htmx_gets_only_the_results_and_a_normalised_address(client: httpx.Client) -> None:

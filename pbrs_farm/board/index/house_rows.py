@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import groupby
@@ -30,6 +31,7 @@ class ViewRow:
     layers: int  # bit k: the file of LAYERS[k] exists
     classes: int  # bit k: NYU40 class k is in view
     warnings: tuple[str, ...]
+    score: float = 0.0  # of the camera's choice, larger is better
 
 
 @dataclass(frozen=True, slots=True)
@@ -86,7 +88,14 @@ def _view_row(
         layers=sum(_BIT_OF_FILE.get(file, 0) for file in files),
         classes=_class_bits(facts.get("instances")),
         warnings=tuple(texts[:_MAX_WARNINGS]),
+        score=finite(facts.get("score")),
     )
+
+
+def finite(value: Any) -> float:
+    """A finite number of a stored file; 0 for any other value."""
+    is_number = isinstance(value, int | float) and math.isfinite(value)
+    return float(value) if is_number else 0.0
 
 
 def _class_bits(instances: Any) -> int:

@@ -85,6 +85,19 @@ class ListedView:
         """True if the view has the file of a layer."""
         return bool(self.layers & LAYER_BIT[layer])
 
+    def row(self) -> dict[str, Any]:
+        """The view in a list as JSON."""
+        verdict = "unjudged" if self.reason is None else "refused" if self.reason else "kept"
+        return {
+            "house": self.house,
+            "view": self.id,
+            "room": self.room,
+            "layers": [name for name in LAYER_BIT if self.has(name)],
+            "warnings": list(self.warnings),
+            "verdict": verdict,
+            "reason": self.reason or "",
+        }
+
     def shown_layer(self, layer: str = "") -> str:
         """The layer of a thumbnail: the given one or else the best picture; "" if it is missing."""
         if layer:
@@ -105,6 +118,18 @@ class ListedHome:
     n_warned: int
     cover: ListedView | None
 
+    def row(self) -> dict[str, Any]:
+        """The home in a list as JSON."""
+        return {
+            "house": self.id,
+            "name": self.name,
+            "credit": self.credit,
+            "n_rooms": self.n_rooms,
+            "n_views": self.n_views,
+            "n_warned": self.n_warned,
+            "best_view": self.cover.id if self.cover else "",
+        }
+
 
 @dataclass(frozen=True, slots=True)
 class Page(Generic[T]):
@@ -114,6 +139,11 @@ class Page(Generic[T]):
     number: int
     n_pages: int
     n_rows: int  # of all pages
+
+    def table(self) -> dict[str, Any]:
+        """The page as JSON; its rows are listed views or homes."""
+        rows = [row.row() for row in self.rows if isinstance(row, ListedView | ListedHome)]
+        return {"page": self.number, "n_pages": self.n_pages, "n_rows": self.n_rows, "rows": rows}
 
 
 class Queries:

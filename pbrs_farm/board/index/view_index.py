@@ -16,7 +16,7 @@ from typing import Any, Final
 from pbrs_farm.board.index.house_rows import HouseRow
 from pbrs_farm.core.lighting import ALL_MODES
 
-_VERSION: Final = 1  # of the tables below
+_VERSION: Final = 2  # of the tables below and of covers
 _SCHEMA: Final = f"""
 PRAGMA journal_mode = WAL;
 CREATE TABLE IF NOT EXISTS house (
@@ -146,9 +146,10 @@ def _enter_house(connection: sqlite3.Connection, house: HouseRow, fingerprint: s
 
 
 def _cover(house: HouseRow) -> str:
-    """The view on the house's card: most lighting modes, then no warning, then the first id."""
+    """The view on the house's card: most lighting modes, no warning, best score of the camera."""
     modes = (1 << len(ALL_MODES)) - 1  # modes are the first layers
     ranked = sorted(
-        house.views, key=lambda v: (-(v.layers & modes).bit_count(), bool(v.warnings), v.id)
+        house.views,
+        key=lambda v: (-(v.layers & modes).bit_count(), bool(v.warnings), -v.score, v.id),
     )
     return ranked[0].id if ranked else ""

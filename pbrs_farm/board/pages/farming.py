@@ -5,6 +5,7 @@ from __future__ import annotations
 import json
 import threading
 from collections.abc import AsyncIterator, Callable
+from dataclasses import asdict
 from functools import partial
 from typing import TYPE_CHECKING, Any, Final
 
@@ -12,12 +13,12 @@ import anyio
 import anyio.to_thread
 from starlette.exceptions import HTTPException
 from starlette.requests import Request
-from starlette.responses import RedirectResponse, Response, StreamingResponse
+from starlette.responses import JSONResponse, RedirectResponse, Response, StreamingResponse
 
 from pbrs_farm.board.guard import form_of
 from pbrs_farm.board.live_farm import LiveFarm
 from pbrs_farm.board.pages.lists import board_of
-from pbrs_farm.board.pages.rendering import page
+from pbrs_farm.board.pages.rendering import asks_for_json, page
 from pbrs_farm.core.errors import PbrsError
 
 if TYPE_CHECKING:
@@ -52,6 +53,8 @@ def live_farm(request: Request) -> LiveFarm:
 def farm(request: Request) -> Response:
     """GET /farm: every job and worker."""
     now = live_farm(request).now()
+    if asks_for_json(request):
+        return JSONResponse(asdict(now))
     audit = board_of(request).audit.last()
     return page(request, "farm.html", now=now, audit=audit, **_prices(request))
 

@@ -17,7 +17,7 @@ from pbrs_farm.board.index.queries import (
     filter_from_query,
     page_number,
 )
-from pbrs_farm.board.pages.rendering import page
+from pbrs_farm.board.pages.rendering import asks_for_json, page
 from pbrs_farm.board.pages.words import OF_A_CANDIDATE, OF_A_SELECTION, listed
 from pbrs_farm.core.lighting import ALL_MODES
 from pbrs_farm.core.shown_text import shown
@@ -59,6 +59,8 @@ def homes(request: Request) -> Response:
     words = request.query_params.get("words", "").strip()[:120]
     queries = board_of(request).queries
     listed_homes = queries.homes(words, page_number(request.query_params.get("page", "")))
+    if asks_for_json(request):
+        return JSONResponse(listed_homes.table())
     return page(request, "homes.html", found=listed_homes, words=words, n_views=queries.n_views())
 
 
@@ -67,6 +69,8 @@ def views(request: Request) -> Response:
     queries = board_of(request).queries
     view_filter = filter_from_query(request.query_params)
     listed_views = queries.views(view_filter)
+    if asks_for_json(request):
+        return JSONResponse(listed_views.table())
     menus = queries.menus()
     # htmx requests the results only, but the whole page for the browser's Back.
     headers = request.headers
@@ -98,6 +102,8 @@ def home(request: Request) -> Response:
     """GET /homes/HOUSE: a home in 3D with its views."""
     entry = asked_home(request)
     views = board_of(request).queries.views_of(entry.id)
+    if asks_for_json(request):
+        return JSONResponse(entry.row() | {"views": [view.row() for view in views]})
     version = views[0].version if views else ""
     words = list(OF_A_CANDIDATE.items())
     return page(

@@ -69,6 +69,13 @@ def page(request: Request, template: str, status: int = 200, **values: Any) -> H
     return HTMLResponse(html, status)
 
 
+def asks_for_json(request: Request) -> bool:
+    """True for ?format=json, and for a header Accept with JSON and without HTML."""
+    accepted = request.headers.get("accept", "")
+    is_accepted = "application/json" in accepted and "text/html" not in accepted
+    return request.query_params.get("format") == "json" or is_accepted
+
+
 def _root_name(url: str) -> str:
     """Name of a root: of a folder its last part, without the path on this machine."""
     if url.startswith("file://"):

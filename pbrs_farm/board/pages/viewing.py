@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import gzip
 import json
-import math
 from collections.abc import Callable
 from typing import Any, Final
 
@@ -17,6 +16,7 @@ from starlette.exceptions import HTTPException
 from starlette.requests import Request
 from starlette.responses import Response, StreamingResponse
 
+from pbrs_farm.board.index.house_rows import finite
 from pbrs_farm.board.index.queries import ListedView
 from pbrs_farm.board.pages.lists import asked_view, board_of
 from pbrs_farm.board.pages.recipe_words import recipe_words
@@ -25,6 +25,7 @@ from pbrs_farm.board.pages.words import OF_A_VIEW, listed
 from pbrs_farm.board.pictures import PLANES, packet, shown_png, thumbnail_jpeg
 from pbrs_farm.board.root_reader import MAX_PICTURE_BYTES, RootReader
 from pbrs_farm.core import keys
+from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.errors import BadInput, PbrsError
 from pbrs_farm.core.layers import LAYER, LAYERS
 from pbrs_farm.formats.layer_file import layer_from_bytes
@@ -56,6 +57,7 @@ def view(request: Request) -> Response:
         first=entry.shown_layer() or "",
         instances=_instances(facts),
         facts=_camera_facts(facts),
+        camera=_camera_expression(facts),
         recipe=recipe_words(board.reader),
         seconds=_seconds(board.reader, entry),
         files=_stored_file_rows(board.reader, entry),
@@ -178,8 +180,8 @@ def _instances(facts: dict[str, Any]) -> list[dict[str, Any]]:
                 "id": r["id"],
                 "name": str(r.get("name", "")),
                 "class": str(r.get("class", "")),
-                "share": _number(r.get("fraction")),
-                "visible": _number(r.get("visible_fraction")),
+                "share": finite(r.get("fraction")),
+                "visible": finite(r.get("visible_fraction")),
                 "truncated": bool(r.get("truncated")),
                 "box": r["box2d"],
             }
@@ -205,11 +207,6 @@ def _is_box(value: Any) -> bool:
     return isinstance(value, list) and len(value) == 4 and all(isinstance(x, int) for x in value)
 
 
-def _number(value: Any) -> float:
-    is_number = isinstance(value, int | float) and math.isfinite(value)
-    return float(value) if is_number else 0.0
-
-
 def _camera_facts(facts: dict[str, Any]) -> list[tuple[str, str]]:
     """(name, text) of the facts in a view.json for the page."""
     rows = [(name, facts.get(name)) for name in ("room", "sector", "origin", "score")]
@@ -229,6 +226,19 @@ def _camera_facts(facts: dict[str, Any]) -> list[tuple[str, str]]:
     return [(name, str(value)) for name, value in rows if value not in (None, "")]
 
 
+def _camera_expression(facts: dict[str, Any]) -> str:
+    """Python that makes the view's camera; "" for other lenses than a pin-hole and for damaged facts."""
+    if "lens" in facts:
+        return ""
+    size = facts.get("width_px"), facts.get("height_px")
+    try:
+        pose, k = (np.asarray(facts.get(x), np.float64) for x in ("world_from_camera_opencv", "K"))
+        Camera.from_opencv(pose, k, size=size)
+    except (PbrsError, TypeError, ValueError):
+        return ""
+    return f"pf.Camera.from_opencv({pose.tolist()}, K={k.tolist()}, size={size})"
+
+
 def _words(facts: dict[str, Any]) -> list[tuple[str, str]]:
     """Glossary of a view's page."""
     named = {name for name, _text in _camera_facts(facts)}
@@ -243,11 +253,11 @@ def _object(holder: dict[str, Any], name: str) -> dict[str, Any]:
 
 
 def _rounded(value: Any) -> str | None:
-    return f"{_number(value):.3f}" if value is not None else None
+    return f"{finite(value):.3f}" if value is not None else None
 
 
 def _with_unit(value: Any, unit: str) -> str | None:
-    return f"{_number(value):.0f} {unit}" if value is not None else None
+    return f"{finite(value):.0f} {unit}" if value is not None else None
 
 
 def _seconds(reader: RootReader, entry: ListedView) -> list[tuple[str, float, str]]:
@@ -256,7 +266,7 @@ def _seconds(reader: RootReader, entry: ListedView) -> list[tuple[str, float, st
     for step in _STEPS:
         marker = reader.json_object(keys.marker_key(entry.house, step, entry.id))
         if marker:
-            rows.append((step, _number(marker.get("seconds")), str(marker.get("worker", ""))))
+            rows.append((step, finite(marker.get("seconds")), str(marker.get("worker", ""))))
     return rows
 
 

@@ -8,6 +8,7 @@ let waiting = 0; // to write the address
 const by = (id) => document.getElementById(id);
 
 if (stage && stage.dataset.packed) start();
+by("copy-camera")?.addEventListener("click", () => navigator.clipboard?.writeText(by("camera").textContent));
 
 function start() {
   const { layers, instances } = JSON.parse(stage.dataset.packed);
