@@ -131,6 +131,7 @@ class _Building:
         items = list(self._items(products))
         spaces = self._rooms_of_spaces()
         items = with_roofs(items, [room for room, _top in spaces])
+        spaces = [(_on_its_floor(room, items), top) for room, top in spaces]
         overheads = Overheads(items)
         rooms = self._under_ceilings(spaces, overheads) or _rooms_between_walls(items, overheads)
         if not rooms:
@@ -608,6 +609,12 @@ def _heights_of_floors(items: Sequence[Item], room: Room) -> list[float]:
             if share > _COVERED:
                 heights.append(_top_of_item(item))
     return heights
+
+
+def _on_its_floor(room: Room, items: Sequence[Item]) -> Room:
+    """The room down to its slab: the body of a space may end at the floor's finish, which is not drawn."""
+    heights = _heights_of_floors(items, room)
+    return replace(room, floor_y=min(max(heights), room.floor_y)) if heights else room
 
 
 def _is_called_attic(name: str) -> bool:

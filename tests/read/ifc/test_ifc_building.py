@@ -275,6 +275,34 @@ def test_a_chair_of_millions_of_triangles_is_refused(tmp_path: Path) -> None:
         read_house(source, ReadFields(max_model_triangles=15))
 
 
+@pytest.mark.parametrize(("slab_top", "floor_y"), [(-0.12, -0.12), (0.0, 0.0), (0.05, 0.0)])
+def test_a_room_reaches_down_to_its_slab_where_no_finish_is_drawn(
+    tmp_path: Path, slab_top: float, floor_y: float
+) -> None:
+    """A garage: the space ends at the floor's finish, the door's hole reaches below it."""
+    building = IfcHouse()
+    building.storey("EG", 0.0)
+    corners = [(0, 0), (4.4, 0), (4.4, 5.4), (0, 5.4)]
+    for k, corner in enumerate(corners):
+        wall = building.wall(f"Wall {k}", corner, corners[(k + 1) % 4], -0.5, 3.1)
+        if k == 0:
+            hole = building.hole(wall, 1.0, 2.4, 0.3, 2.3)
+            leaf = building.box_solid((0, 0.08, 0.2), (2.4, 0.12, 2.3))
+            building.fill(hole, "IfcDoor", "Garage door", [leaf])
+    slab = building.box_solid((0, 0, slab_top - 0.25), (4.4, 5.4, slab_top))
+    building.product("IfcSlab", "Slab", [slab], PredefinedType="FLOOR")
+    inside = [(0.2, 0.2), (4.2, 0.2), (4.2, 5.2), (0.2, 5.2)]
+    building.space("Garage", inside, 0.0, 2.6)
+    roof = building.box_solid((-0.3, -0.3, 0), (4.7, 5.7, 0.3))
+    building.product("IfcSlab", "Roof", [roof], (0, 0, 2.6), PredefinedType="ROOF")
+    house = read_house(resolve(str(building.save(tmp_path / "garage.ifc"))), ReadFields())
+    (room,) = house.rooms
+    assert room.floor_y == pytest.approx(floor_y, abs=1e-5)
+    _repaired, report = repair(house, RepairFields(), occluder_from=EmbreeOccluder)
+    assert report.leaks.closed_share == 1
+    assert (report.leaks.n_sky, report.leaks.n_rays > 100_000) == (0, True)
+
+
 def test_a_repaired_building_leaks_no_ray_and_keeps_walls_and_openings(tmp_path: Path) -> None:
     house = read(two_rooms(), tmp_path)
     repaired, report = repair(house, RepairFields(), occluder_from=EmbreeOccluder)
