@@ -30,7 +30,7 @@ from pbrs_farm.curate.teaching_rules import RuleVerdict, judged_by, write_verdic
 from pbrs_farm.export.export_views import export
 from pbrs_farm.formats.manifest import lines_by_house, sha256_by_key
 from pbrs_farm.formats.output_folder import views_of
-from pbrs_farm.regular_files import digest_of_regular, read_regular
+from pbrs_farm.regular_files import digest_of_regular, fault_of, read_regular
 from pbrs_farm.run.local_run import Run
 from pbrs_farm.run.request import ProcessLimitOptions
 from pbrs_farm.sets.data_set import DataSet, SetForm, SetPart
@@ -46,6 +46,7 @@ _PARTS: Final = "parts"
 _FORMS: Final = "forms"
 _INDEX: Final = "index.csv"
 _CARD: Final = "README.md"
+_RENDER_AGAIN: Final = "remove the folder of its home, and run make again"
 _ROOT_FILES: Final = (keys.RECIPE, keys.MANIFEST, keys.ATTRIBUTION)
 
 Planned = Mapping[str, Sequence[str]]
@@ -125,8 +126,8 @@ def finish_set(
     """Select views and write forms, index, card and checksums of a set whose parts are all rendered.
 
     planned: part's name -> its views. Finished steps are skipped. tell: called with a line for each new
-    step. Returns the number of new steps. Raises BadInput for foreign houses in a part's folder, and as
-    export and pack.
+    step. Returns the number of new steps. Raises BadInput for foreign houses in a part's folder, for
+    missing or damaged rendered files, and as export and pack.
     """
     steps = _Steps(out, tell)
     parts = [
@@ -147,8 +148,11 @@ def finish_set(
     for of in parts:
         steps.sums |= _root_sums(of, out)
     # in the order of names, to compare two lists line by line
-    lines = (f"{digest}  {name}\n" for name, digest in sorted(steps.sums.items()))
-    steps.write(SUMS, "".join(lines).encode())
+    lines = "".join(f"{digest}  {name}\n" for name, digest in sorted(steps.sums.items()))
+    if get_or_none(steps.store, SUMS) != lines.encode():
+        for of in parts:
+            steps.check_rendered(of.root)
+        steps.write(SUMS, lines.encode())
     return steps.n_made
 
 
@@ -161,6 +165,20 @@ class _Steps:
         self.sums: dict[str, str] = {}  # file -> sha256, of all steps
         self.n_made = 0
         self._tell = tell
+        self._checked: set[Path] = set()  # roots
+
+    def check_rendered(self, root: Path) -> None:
+        """Raise BadInput for the first file of a root that is not as its manifest lists it; once a root."""
+        if root in self._checked:
+            return
+        for key, digest in _listed_sums(root):
+            try:
+                is_whole = digest_of_regular(root / key) == digest
+            except OSError as error:
+                raise BadInput(root / key, "", fault_of(error), hint=_RENDER_AGAIN) from None
+            if not is_whole:
+                raise BadInput(root / key, "", "is damaged: not as rendered", hint=_RENDER_AGAIN)
+        self._checked.add(root)
 
     def unless_done(
         self, name: str, digest: str, make: Callable[[], object], files: Callable[[], Sequence[str]]
@@ -198,6 +216,7 @@ def _judged_part(
     files = [keys.SELECTION, keys.selection_key(data_set.name, "jsonl")]
 
     def judge() -> None:
+        steps.check_rendered(root)
         chosen = {(house, view) for house, views in planned.items() for view in views}
         entries = [e for e in views_of(root) if (e.house.id, e.id) in chosen]
         verdicts = judged_by(entries, part.rules)
@@ -241,6 +260,7 @@ def _write_form(
     folder = out / _FORMS / form.name / made_part.part.name
 
     def write() -> None:
+        steps.check_rendered(made_part.root)
         # remains of a killed call
         shutil.rmtree(folder, ignore_errors=True)
         folder.parent.mkdir(parents=True, exist_ok=True)
@@ -285,15 +305,19 @@ def _index_text(data_set: DataSet, made_parts: Sequence[MadePart]) -> str:
     return text.getvalue()
 
 
-def _root_sums(made_part: MadePart, out: Path) -> Iterator[tuple[str, str]]:
-    """(file, sha256) of the rendered files, from the manifest."""
-    below = made_part.root.relative_to(out).as_posix()
-    manifest = FolderStore(made_part.root).get(keys.MANIFEST)
-    for house, lines in lines_by_house(manifest):
+def _listed_sums(root: Path) -> Iterator[tuple[str, str]]:
+    """(key, sha256) of the rendered files of a root, from its manifest."""
+    for house, lines in lines_by_house(FolderStore(root).get(keys.MANIFEST)):
         # the manifest of a home has these lines
-        yield f"{below}/{keys.house_key(house, keys.MANIFEST)}", keys.sha256(lines)
-        for key, digest in sha256_by_key(lines).items():
-            yield f"{below}/{key}", digest
+        yield keys.house_key(house, keys.MANIFEST), keys.sha256(lines)
+        yield from sha256_by_key(lines).items()
+
+
+def _root_sums(made_part: MadePart, out: Path) -> Iterator[tuple[str, str]]:
+    """(file, sha256) of the files of a part's root."""
+    below = made_part.root.relative_to(out).as_posix()
+    for key, digest in _listed_sums(made_part.root):
+        yield f"{below}/{key}", digest
     for file in _ROOT_FILES:
         if (made_part.root / file).is_file():
             yield f"{below}/{file}", digest_of_regular(made_part.root / file)

@@ -103,6 +103,30 @@ def test_a_file_that_is_gone_is_made_again(file: Path, finished_set: Path, tmp_p
     assert digests(out) == digests(finished_set)
 
 
+def test_a_damaged_file_of_a_part_is_named_and_nothing_signed(
+    file: Path, finished_set: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    out = tmp_path / "small"
+    shutil.copytree(finished_set, out)
+    depth = min(out.glob("parts/views/houses/*/views/*/depth.png"))
+    changed = bytearray(depth.read_bytes())
+    changed[-20] ^= 1
+    depth.write_bytes(changed)
+    # A step that makes nothing opens no part; a form that is made again does.
+    shutil.rmtree(out / "forms/coco")
+    before = digests(out)
+    assert main(["make", str(file), "--out", str(out)]) == 1
+    assert f"{depth}: is damaged: not as rendered" in capsys.readouterr().err
+    assert digests(out) == before
+    (out / "SHA256SUMS").unlink()
+    shutil.copytree(finished_set / "forms/coco", out / "forms/coco")
+    assert main(["make", str(file), "--out", str(out)]) == 1
+    assert not (out / "SHA256SUMS").exists()
+    shutil.rmtree(depth.parents[2])
+    assert main(["make", str(file), "--out", str(out)]) == 0
+    assert digests(out) == digests(finished_set)
+
+
 @pytest.mark.long
 def test_killed_three_times_it_has_the_bytes_of_a_run_that_was_not(
     file: Path, finished_set: Path, tmp_path: Path
