@@ -2,7 +2,7 @@
 
 The loaders are those of tests/export, written from each form's documentation; they share no code with the writers. A form is
 equal if no label differs in any pixel, depth is within the form's step, and K and poses are the view's. Questions are about
-pictures and walks of dressed homes that nobody tunes on; tests/export/question_check.py answers them again from the stored
+pictures and walks of dressed homes that nobody tunes on; pbrs_farm/check/question_answers.py answers them again from the stored
 files. A set of two homes must have the same bytes from one process, from two killed ones, and from two shards.
 """
 
@@ -20,9 +20,9 @@ from typing import Any, Final
 from xml.etree import ElementTree
 
 from benchmarks.figures import write_report
+from pbrs_farm.check.question_answers import wrong_answers
 from pbrs_farm.curate.teaching_rules import REASONS, judged_by
 from pbrs_farm.export.export_views import finished_entries
-from tests.export.question_check import wrong_answers
 
 UNITS: Final = {
     "sets.forms": "forms of views read back equal by code of its own",

@@ -15,8 +15,10 @@ from typing import Any
 import numpy as np
 
 from benchmarks.figures import write_report
+from pbrs_farm import cli
 from pbrs_farm.assets import homes_package
 from pbrs_farm.check import fields, methods, verify
+from pbrs_farm.check.stored_set import stored_set
 from pbrs_farm.core.frames import LM_PER_W, srgb_from_linear
 from pbrs_farm.core.house import House, Material, corners_of_surfaces, geometry_from_house
 from pbrs_farm.core.recipe import recipe_from_name
@@ -34,15 +36,19 @@ from pbrs_farm.transport.scene_tables.sky import uniform_sky
 from pbrs_farm.transport.validation import known_rooms as rooms
 from pbrs_farm.truth.surface_layers import albedo_label
 from tests.check.falsehoods import FALSEHOODS, planted
+from tests.check.set_falsehoods import FORMS
+from tests.check.set_falsehoods import KINDS as KINDS_OF_SETS
+from tests.check.set_falsehoods import planted as planted_in_set
 from tests.check.sorts_of_roots import ROOTS
 from tests.read.gltf.gltf_scenes import read, two_rooms
+from tests.sets.small_sets import small_set
 
 MADE = ("made:1", "made:2")
 N_DRAWN = 2  # example homes whose boxes are measured
 UNITS = {
     "truth.planted": "kinds of falsehood found, all hashes mended",
     "truth.kinds": "kinds planted",
-    "truth.unowned_fields": "fields, files and layers of those roots without a check and without a note that none checks them",
+    "truth.unowned_fields": "fields, files and layers of those roots and a set without a check and without a note that none checks them",
     "truth.false_alarms": "failed checks of true roots: films, pairs, lamps, edited, generated, read from six formats",
     "truth.roots": "true roots",
     "truth.albedo_error": "of 255: light reflected by a textured floor under a white sky against its label, worst of five",
@@ -61,7 +67,10 @@ def main() -> None:
         folder = Path(name)
         figures |= _true_roots(folder / "roots")
         n_found = _found(folder)
-        n_kinds = sum(len(kinds) for kinds in FALSEHOODS.values())
+        n_kinds = sum(len(kinds) for kinds in FALSEHOODS.values()) + len(KINDS_OF_SETS)
+        n_in_set, n_unowned = _of_set(folder / "set")
+        n_found += n_in_set
+        figures["truth.unowned_fields"] += n_unowned
         figures |= {"truth.planted": n_found, "truth.kinds": n_kinds}
         figures["truth.albedo_error"] = round(_albedo_error(), 3)
         figures["truth.emitter_error"] = round(_emitter_error(), 5)
@@ -85,7 +94,7 @@ def _true_roots(folder: Path) -> dict[str, int]:
         alarms += sum(count.failed > 0 for count in certificate.counts.values())
         houses = list(root.glob("houses/*"))
         lacking |= set(fields.unowned(fields.stored_fields(root, houses)))
-        lacking |= {(line, "") for line in methods.unknown_files(root, houses)}
+        lacking |= {(line, "") for line in methods.unknown_files([root, *houses])}
     lacking |= {(file, "") for file in methods.unowned_layers()}
     for file, field in sorted(lacking):
         print(f"no owner: {file} {field}")
@@ -106,6 +115,26 @@ def _found(folder: Path) -> int:
             if not is_found:
                 print(f"not found: {sort}: {kind}", flush=True)
     return n
+
+
+def _of_set(folder: Path) -> tuple[int, int]:
+    """Kinds of falsehood found in a set, and fields of it without a row."""
+    out, n = folder / "small", 0
+    assert cli.main(["make", str(small_set(folder, FORMS, "128x96")), "--out", str(out)]) == 0
+    stored = stored_set(out)
+    assert stored is not None
+    lacking = [
+        pair for pair in fields.fields_of_set(stored) if fields.row_and_names(*pair)[0] is None
+    ]
+    for kind, (_plant, check) in KINDS_OF_SETS.items():
+        shutil.rmtree(folder / "planted", ignore_errors=True)
+        is_found = check in planted_in_set(shutil.copytree(out, folder / "planted"), kind)
+        n += is_found
+        if not is_found:
+            print(f"not found: set: {kind}", flush=True)
+    for file, field in lacking:
+        print(f"no owner: {file} {field}")
+    return n, len(lacking)
 
 
 def _albedo_error() -> float:

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
+import glob
 import zlib
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass, field
 from functools import cached_property
 from pathlib import Path
@@ -14,9 +15,12 @@ from numpy.typing import NDArray
 
 from pbrs_farm.check.certificate import Expect, Tally
 from pbrs_farm.check.embree_caster import Hits, Rays
+from pbrs_farm.check.fields import row_and_names
 from pbrs_farm.check.moved_house import MovedHouse, house_at
+from pbrs_farm.check.stored_files import stored_object
 from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_mesh import Triangles
+from pbrs_farm.check.stored_set import StoredForm, StoredSet
 from pbrs_farm.check.stored_view import StoredView
 from pbrs_farm.core.arrays import F32, F64, I64, Bools
 
@@ -248,3 +252,79 @@ class ViewCase:
             rng = np.random.default_rng(zlib.crc32(self.place.encode()))
             index = rng.choice(height * width, n_pixels, replace=False)
         return index // width, index % width
+
+
+@dataclass(frozen=True, slots=True)
+class SetCase:
+    """A training set."""
+
+    stored: StoredSet
+    tally: Tally
+
+
+@dataclass(frozen=True, eq=False)
+class FormCase:
+    """A part's views in a form, or those of one split."""
+
+    form: StoredForm
+    split: str  # "" for a form without folders of splits
+    kept: frozenset[tuple[str, str]]  # (house, view) that the index keeps here
+    root: Path  # of the part
+    split_of: Callable[[str], str]  # house -> its split
+    tally: Tally
+
+    @property
+    def folder(self) -> Path:
+        """The folder of the split."""
+        return self.form.folder / self.split
+
+    @cached_property
+    def keys(self) -> dict[str, tuple[str, str]]:
+        """`<house>__<view>` -> house and view of the kept views, by name."""
+        return {f"{house}__{view}": (house, view) for house, view in sorted(self.kept)}
+
+    def view(self, key: str) -> StoredView | None:
+        """The part's view of a key; None unless it is kept. BadFile if its view.json is damaged."""
+        if key not in self.keys:
+            return None
+        house, view = self.keys[key]
+        folder = next(self.root.glob(f"*/{glob.escape(house)}/views/{glob.escape(view)}"), None)
+        if folder is None:
+            return None
+        return StoredView(folder, stored_object(folder / "view.json"))
+
+    @cached_property
+    def files(self) -> tuple[str, ...]:
+        """Every file of the folder, below it."""
+        paths = (p.relative_to(self.folder) for p in self.folder.rglob("*") if p.is_file())
+        return tuple(sorted(path.as_posix() for path in paths))
+
+    def place(self, file: str = "") -> str:
+        """A file as messages name it."""
+        names = "forms", self.form.name, self.form.part, self.split, file
+        return "/".join(filter(None, names))
+
+    def compare(
+        self, check: str, place: str, stored: NDArray[Any], truth: Any, within: float = 0
+    ) -> None:
+        """Compare an array with the part's, pixel by pixel, within a tolerance."""
+        shape = None if truth is None else np.shape(truth)
+        fault = f"is {stored.shape}, the part's {shape}"
+        if self.tally.expect(check, place, stored.shape == shape, fault):
+            near = np.abs(stored.astype(np.float64) - truth) <= within
+            self.tally.pixels(check, place, near.reshape(*near.shape[:2], -1).all(-1))
+
+    def has(self, name: str) -> bool:
+        """False for "NYU40" in a form with the classes of a user's table."""
+        return name != "NYU40" or not self.form.options.get("classes")
+
+    def matching(self, check: str) -> Iterator[tuple[str, str]]:
+        """The files of a check by set_fields.csv whose names give a view, with the view's key."""
+        for file in self.files:
+            row, names = row_and_names(f"{self.form.to}/{file}")
+            if row is not None and row.check == check and names:
+                key = names.get("key") or f"{names['house']}__{names.get('view')}"
+                if "number" in names:  # of the house's views
+                    of_house = [k for k, pair in self.keys.items() if pair[0] == names["house"]]
+                    key = dict(enumerate(of_house)).get(int(names["number"]), "")
+                yield file, key

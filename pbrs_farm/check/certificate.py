@@ -114,6 +114,7 @@ class Tally:
         self._counts: dict[str, list[int]] = {}  # check -> [checked, failed, ties]
         self._listed: dict[str, list[str]] = {}  # check -> lines of failures
         self.notes: list[str] = []
+        self.below = ""  # prefix of places: "parts/views/" within a set
         self._coincident: dict[tuple[str, str, str], int] = {}  # house and two items -> pixels
 
     def add(self, check: str, checked: int, *, ties: int = 0) -> None:
@@ -143,7 +144,8 @@ class Tally:
         self._counts.setdefault(check, [0, 0, 0])[1] += int(n_failed)
         listed = self._listed.setdefault(check, [])
         if len(listed) < MAX_LISTED:
-            listed.append(f"{check}: {shown(place, MAX_PLACE)}: {shown(fault, MAX_MESSAGE)}")
+            at = shown(f"{self.below}{place}", MAX_PLACE)
+            listed.append(f"{check}: {at}: {shown(fault, MAX_MESSAGE)}")
 
     def note(self, text: str) -> None:
         """Report an oddity, which is not counted as a failure."""

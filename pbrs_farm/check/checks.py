@@ -12,8 +12,8 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from typing import Any, Literal
 
-Subject = Literal["root", "files", "house", "camera", "view", "views"]
-"""What a check looks at: a root, the files of a house, its documents, a view's camera, a view, all views of a house."""
+Subject = Literal["root", "files", "house", "camera", "view", "views", "set", "form"]
+"""What a check looks at: a root, the files of a house, its documents, a view's camera, a view, all views of a house; a set, a part's form."""
 
 
 @dataclass(frozen=True, slots=True)

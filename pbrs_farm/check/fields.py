@@ -6,12 +6,16 @@ Effects: reads files. A field without a row is listed by its name, so that no fi
 from __future__ import annotations
 
 import functools
+import json
+import re
+import tarfile
 from collections import Counter
-from collections.abc import Iterable, Iterator
+from collections.abc import Callable, Iterable, Iterator
 from pathlib import Path
 from typing import Any
 
-from pbrs_farm.check.stored_files import BadFile, object_from_json, stored_bytes
+from pbrs_farm.check.stored_files import stored_bytes
+from pbrs_farm.check.stored_set import SPLITS, SUMS, StoredSet
 from pbrs_farm.core.record import Record, read_csv
 
 UNOWNED = "no check covers it"
@@ -21,7 +25,7 @@ class FieldRow(Record):
     """A field of a file: its check, or the reason why it has no check."""
 
     file: str
-    field: str
+    field: str = ""  # "" is a whole file
     check: str = ""
     why: str = ""
 
@@ -74,17 +78,94 @@ def _fits(pattern: tuple[str, ...], parts: tuple[str, ...]) -> bool:
     )
 
 
+@functools.cache
+def _rows_of_sets() -> tuple[tuple[FieldRow, re.Pattern[str]], ...]:
+    """The rows of set_fields.csv with the patterns of their files."""
+    rows = read_csv(Path(__file__).with_name("set_fields.csv"), FieldRow)
+    return tuple((row, re.compile(_pattern(row.file))) for row in rows)
+
+
+def _pattern(file: str) -> str:
+    text = re.escape(file).replace(r"\*\*", ".*").replace(r"\*", "[^/]*")
+    text = text.replace(r"\{number\}", r"(?P<number>\d+)")
+    return re.sub(r"\\{(house|view|key)\\}", r"(?P<\1>[^/]+?)", text)
+
+
+def row_and_names(file: str, field: str = "") -> tuple[FieldRow | None, dict[str, str]]:
+    """The row of a field of a set's file, and the names in the file's name; None for an unknown one.
+
+    file: of a form with its word, below its split. field: "" for a file as a whole.
+    """
+    parts = tuple(field.split("."))
+    for row, pattern in _rows_of_sets():
+        match = pattern.fullmatch(file)
+        if match and _fits(tuple(row.field.split(".")), parts):
+            return row, match.groupdict()
+    return None, {}
+
+
+def fields_of_set(stored: StoredSet) -> set[tuple[str, str]]:
+    """(File, field) of a set's files except those of parts.
+
+    A file of a form begins with the form's word, below its folder of a split.
+    """
+    words = {form.name: form.to for form in stored.forms()}
+    markers = (f"done/{path.name}" for path in stored.folder.glob("done/*.json"))
+    fields = set[tuple[str, str]]()
+    for file in (*stored.files(), *markers):
+        folder, *below = name = tuple(file.split("/"))
+        if folder == "forms" and len(below) > 2:
+            form, _part, *below = below
+            name = (words.get(form, form), *(below[1:] if below[0] in SPLITS else below))
+        if folder != "parts":
+            fields |= {("/".join(name), field) for field in _fields_in(stored.folder / file)}
+    return fields
+
+
+def _fields_in(file: Path) -> set[str]:
+    """The fields of a JSON file, the columns of a table, the parts in a tar; "" of other files, none of damaged ones."""
+    try:
+        if file.suffix in (".json", ".jsonl"):
+            data = stored_bytes(file)
+            lines = data.splitlines() if file.suffix == ".jsonl" else [data]
+            return {field for line in lines for field in fields_of(json.loads(line))}
+        if file.suffix == ".csv":
+            return set(stored_bytes(file).decode().partition("\n")[0].split(","))
+        if file.suffix == ".parquet":
+            import pyarrow.parquet as pq
+
+            return set(pq.read_schema(file).names)
+        if file.suffix == ".tar":
+            with tarfile.open(file) as tar:
+                return {name.partition(".")[2].replace(".", "_") for name in tar.getnames()}
+    except (ValueError, OSError, tarfile.TarError, RecursionError):
+        return set()
+    return {""}
+
+
+def set_lines(stored: StoredSet) -> tuple[list[str], list[str]]:
+    """Lines of a set's certificate: kinds of fields with a check, by file; fields without; parts not at hand."""
+    rows: dict[tuple[str, str], FieldRow | None] = {}
+    for file, field in fields_of_set(stored):
+        row, _names = row_and_names(file, field)
+        # One line for all files of a kind without a row.
+        kind = f"{file.partition('/')[0]}/**{Path(file).suffix}" if row is None else row.file
+        rows[kind, field] = row
+    looked, omitted = field_lines(Counter(rows), lambda file, field: rows[file, field])
+    for form in stored.forms():
+        place = f"forms/{form.name}/{form.part}"
+        if form.part not in stored.roots:
+            omitted.append(f"{place}: parts/{form.part} is not at hand: {SUMS} alone")
+        elif form.options.get("classes"):
+            omitted.append(f"{place}: boxes, masks and classes are those of a user's table")
+    return looked, omitted
+
+
 def stored_fields(root: Path, houses: Iterable[Path]) -> Counter[tuple[str, str]]:
     """(File, field) -> number of files of a root that have it; files without JSON are skipped."""
     counts: Counter[tuple[str, str]] = Counter()
     for name, file in _documents(root, houses):
-        try:
-            data = stored_bytes(file)
-            lines = data.splitlines() if file.suffix == ".jsonl" else [data]
-            paths = {path for line in lines for path in fields_of(object_from_json(line))}
-        except BadFile:
-            continue
-        counts.update((name, path) for path in paths)
+        counts.update((name, path) for path in _fields_in(file))
     return counts
 
 
@@ -102,12 +183,14 @@ def unowned(fields: Iterable[tuple[str, str]]) -> list[tuple[str, str]]:
     return sorted(pair for pair in fields if owner_of(*pair) is None)
 
 
-def field_lines(fields: Counter[tuple[str, str]]) -> tuple[list[str], list[str]]:
+def field_lines(
+    fields: Counter[tuple[str, str]], owner: Callable[[str, str], FieldRow | None] = owner_of
+) -> tuple[list[str], list[str]]:
     """Lines of the certificate: numbers of fields with a check, by file; fields without, by reason."""
     owned: dict[str, set[str]] = {}
     reasons: dict[tuple[str, str], set[str]] = {}
     for file, field in sorted(fields):
-        row = owner_of(file, field)
+        row = owner(file, field)
         if row is not None and row.check:
             owned.setdefault(file, set()).add(row.field)
         else:
@@ -116,4 +199,5 @@ def field_lines(fields: Counter[tuple[str, str]]) -> tuple[list[str], list[str]]
     looked = [f"{file}: {len(names)} kinds of fields" for file, names in owned.items()]
     # Unknown fields come first.
     order = sorted(reasons, key=lambda pair: (pair[1] != UNOWNED, pair))
-    return looked, [f"{file} {', '.join(sorted(reasons[file, why]))}: {why}" for file, why in order]
+    names = {pair: ", ".join(sorted(reasons[pair])) for pair in order}
+    return looked, [f"{f'{file} {names[file, why]}'.rstrip()}: {why}" for file, why in order]

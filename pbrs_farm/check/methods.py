@@ -59,8 +59,7 @@ def looked_at(views: list[StoredView], fields: Counter[tuple[str, str]]) -> tupl
 
 
 def not_looked_at(
-    root: Path,
-    houses: list[Path],
+    folders: list[Path],
     views: list[StoredView],
     fields: Counter[tuple[str, str]],
     n_halved: int = 0,
@@ -69,8 +68,9 @@ def not_looked_at(
 ) -> tuple[str, ...]:
     """A line for each kind of file that only has a hash, or little more, and for each field without a check.
 
-    With each view whose light could not be developed again and why, the number of views that were
-    denoised at half their size, light that was not traced again, and the lines that apply to every root.
+    folders: the roots and their houses. With each view whose light could not be developed again and why,
+    the number of views that were denoised at half their size, light that was not traced again, and the
+    lines that apply to every root.
     """
     counts, how_of = _file_counts(views), how_of_files()
     layers = {layer.file for layer in LAYERS}
@@ -79,7 +79,7 @@ def not_looked_at(
         if file not in how_of:
             how = "hash, size and type alone" if file in layers else "hash alone"
             lines.append(f"{file} ({counts[file]}): {how}")
-    lines += unknown_files(root, houses)
+    lines += unknown_files(folders)
     lines += field_lines(fields)[1]
     lines += [f"light of {view.place}: {why}" for view in views if (why := _light_fault(view))]
     if n_halved:
@@ -92,11 +92,9 @@ def not_looked_at(
     return (*lines, *_NEVER)
 
 
-def unknown_files(root: Path, houses: list[Path]) -> list[str]:
-    """A line for each file beside the views that no check opens."""
-    counts = Counter(file.name for file in root.glob("*") if file.is_file())
-    for house in houses:
-        counts.update(file.name for file in house.glob("*") if file.is_file())
+def unknown_files(folders: list[Path]) -> list[str]:
+    """A line for each file of roots and houses, beside the views, that no check opens."""
+    counts = Counter(f.name for folder in folders for f in folder.glob("*") if f.is_file())
     return [
         f"{name} ({n}): no check knows it"
         for name, n in sorted(counts.items())

@@ -106,4 +106,4 @@ def _windows(stored: F64, traced: F64, is_whole: Bools, level: float) -> Iterato
         yield _Window(float(sigmas[row, column]), allowed, row, column, ratio)
 
 
-CHECKS = (Check("light traced", "view", check_traced, 90, ("radiance",)),)
+CHECKS = (Check("light traced", "view", check_traced, 96, ("radiance",)),)

@@ -8,7 +8,9 @@ from __future__ import annotations
 
 import functools
 import itertools
+import tarfile
 import zlib
+from collections import Counter
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
@@ -18,22 +20,25 @@ import numpy as np
 
 from pbrs_farm.check.cases import (
     SAMPLE,
+    FormCase,
     HouseCase,
     RootCase,
     ScenesInTime,
     SeenView,
+    SetCase,
     Tracer,
     ViewCase,
 )
 from pbrs_farm.check.certificate import Certificate, Tally
 from pbrs_farm.check.checks import Subject, checks
-from pbrs_farm.check.fields import stored_fields
+from pbrs_farm.check.fields import set_lines, stored_fields
 from pbrs_farm.check.file_checks import unfinished_houses
 from pbrs_farm.check.light_checks import may_be_halved
 from pbrs_farm.check.methods import looked_at, not_looked_at
 from pbrs_farm.check.stored_files import BadFile, stored_bytes
 from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_mesh import BadGlb, triangles_from_glb
+from pbrs_farm.check.stored_set import PACKED, SUMS, StoredForm, StoredSet, stored_set
 from pbrs_farm.check.stored_view import StoredView, read_labels, read_radiance, views_of_house
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
@@ -49,41 +54,82 @@ def verify(
     *,
     sample: int | None = None,
     all_pixels: bool = False,
-    tracer: Tracer | None = None,
+    tracer: Callable[[Path], Tracer] | None = None,
     tell: Callable[[int, int], None] = lambda _n, _of: None,
 ) -> Certificate:
-    """Check every house and view below folder (an output root) and report how much was checked.
+    """Check every house and view below folder, an output root or a set, and report how much was checked.
 
     sample: pixels of each view to recompute by rays (SAMPLE when None); all_pixels: every
-    one. Checks on files, tables and whole pictures are always complete. tracer: traces light again, which
-    is compared with the stored light; None = it is listed as not checked. tell: called after each
+    one. Checks on files, tables and whole pictures are always complete. tracer: makes of a root what traces
+    its light again, for comparison with the stored light; None = it is listed as not checked. tell: called after each
     view with the number of views checked and their total. Raises BadInput if folder is no output root.
     """
-    folders = [p for name in keys.FOLDERS for p in (folder / name).glob("*") if p.is_dir()]
-    houses = sorted(folders, key=lambda p: p.name)
-    if not houses:
+    stored = stored_set(folder)
+    roots = {"": folder} if stored is None else {f"parts/{p}/": r for p, r in stored.roots.items()}
+    houses = {root: _houses(root) for root in roots.values()}
+    if stored is None and not houses[folder]:
         text = "no houses here" if folder.is_dir() else "no such folder"
         raise BadInput(folder, "", text, hint="give the output folder of a run")
-    tally, views, n_halved = Tally(), list[StoredView](), 0
+    tally, views, n_halved, unfinished = Tally(), list[StoredView](), 0, list[str]()
     # None is every pixel.
     n_pixels = None if all_pixels else (SAMPLE if sample is None else sample)
-    n_views = sum(1 for house in houses for _file in house.glob("views/*/view.json"))
+    all_houses = [house for folders in houses.values() for house in folders]
+    n_views = sum(1 for house in all_houses for _file in house.glob("views/*/view.json"))
     checked = itertools.count(1)
     tell(0, n_views)
-    _run("root", RootCase(folder, tuple(houses), tally))
-    for house in houses:
-        _run("files", RootCase(folder, (house,), tally))
-        of_house, halved = _check_house(
-            house, n_pixels, tally, tracer, lambda: tell(next(checked), n_views)
-        )
-        views, n_halved = views + of_house, n_halved + halved
+    if stored is not None:
+        check_set(stored, tally)
+        unfinished = [] if stored.sums else [f"{SUMS} is not written"]
+    for below, root in roots.items():
+        tally.below = below
+        _run("root", RootCase(root, tuple(houses[root]), tally))
+        of_root = None if tracer is None else tracer(root)
+        for house in houses[root]:
+            _run("files", RootCase(root, (house,), tally))
+            of_house, halved = _check_house(
+                house, n_pixels, tally, of_root, lambda: tell(next(checked), n_views)
+            )
+            views, n_halved = views + of_house, n_halved + halved
+        unfinished += unfinished_houses(root, houses[root]).values()
+    tally.below = ""
     _judge_ties(tally)
-    rendered = unfinished_houses(folder, houses)
-    fields = stored_fields(folder, houses)
+    fields = sum((stored_fields(r, folders) for r, folders in houses.items()), Counter[Any]())
+    looked, omitted = ([], []) if stored is None else set_lines(stored)
+    if stored is None:
+        omitted.append(
+            "exports and sets made from it: `pbrs-farm verify SET` checks a set's folder"
+        )
     return tally.certificate(
-        str(folder), len(houses), len(views), all_pixels=all_pixels,
-        unfinished=tuple(rendered.values()), looked_at=looked_at(views, fields), not_looked_at=not_looked_at(folder, houses, views, fields, n_halved, is_traced=tracer is not None),
+        str(folder), len(all_houses), len(views) if stored is None else len(stored.views), all_pixels=all_pixels,
+        unfinished=tuple(unfinished), looked_at=(*looked_at(views, fields), *looked),
+        not_looked_at=(*not_looked_at([*houses, *all_houses], views, fields, n_halved, is_traced=tracer is not None), *omitted),
     )  # fmt: skip
+
+
+def _houses(root: Path) -> list[Path]:
+    folders = [p for name in keys.FOLDERS for p in (root / name).glob("*") if p.is_dir()]
+    return sorted(folders, key=lambda p: p.name)
+
+
+def check_set(stored: StoredSet, tally: Tally) -> None:
+    """Check a set's own files, and its forms of the parts at hand; not the parts themselves."""
+    _run_each("set", SetCase(stored, tally), stored.file)
+    for form in stored.forms():
+        check_form(stored, form, tally)
+
+
+def check_form(stored: StoredSet, form: StoredForm, tally: Tally) -> None:
+    """Check a form of a part by the part's files; nothing if these are not at hand."""
+    root = stored.roots.get(form.part)
+    if root is None:
+        return
+    by_split: dict[str, set[tuple[str, str]]] = {}
+    for house, view in stored.kept(form.part):
+        split = "" if form.to in PACKED else stored.split_of(house)
+        by_split.setdefault(split, set()).add((house, view))
+    for split, kept in sorted(by_split.items()):
+        case = FormCase(form, split, frozenset(kept), root, stored.split_of, tally)
+        _run_each("form", case, case.place())
 
 
 def _run(of: Subject, case: Any) -> None:
@@ -93,15 +139,15 @@ def _run(of: Subject, case: Any) -> None:
             check.function(case)
 
 
-def _run_each(of: Subject, case: HouseCase, fault_check: str = "") -> None:
+def _run_each(of: Subject, case: Any, place: str, fault_check: str = "") -> None:
     """The same, where a check that stumbles over a document fails and the next ones go on."""
     for check in checks(of):
         try:
             if check.is_needed(case):
                 check.function(case)
-        except FAULTS as error:
-            place = f"{case.house.id}/{check.needs[0]}" if check.needs else case.house.id
-            case.tally.expect(fault_check or check.name, place, False, _fault(error))
+        except (*FAULTS, OSError, tarfile.TarError, BadInput) as error:
+            file = f"{place}/{check.needs[0]}" if of == "house" and check.needs else place
+            case.tally.expect(fault_check or check.name, file, False, _fault(error))
 
 
 def _fault(error: Exception) -> str:
@@ -131,7 +177,7 @@ def _check_house(
         tally.expect("layers", house.id, False, f"house.glb {error}")
         return [], 0
     case = HouseCase(house, glb, ScenesInTime(house, triangles), tally, tracer=tracer)
-    _run_each("house", case, "layers")
+    _run_each("house", case, house.id, "layers")
     # A damaged view fails and the next ones go on.
     checked: list[SeenView] = []
     halved = {view.place for view in views[1:] if _is_halved(view, n_pixels)}
@@ -141,7 +187,7 @@ def _check_house(
         except FAULTS as error:
             tally.expect("layers", f"{view.place}/view.json", False, _fault(error))
         tell()
-    _run_each("views", replace(case, views=tuple(checked)))
+    _run_each("views", replace(case, views=tuple(checked)), house.id)
     return views, len(halved)
 
 

@@ -137,7 +137,7 @@ def _verify_folder(args: argparse.Namespace) -> int:
     if args.sample is not None:
         at_least("--sample", args.sample, 1)
     with folder_of(args.folder) as folder, counting_bar("views") as tell:
-        tracer = LightAgain(folder) if args.light else None
+        tracer = LightAgain if args.light else None
         certificate = verify(
             folder, sample=args.sample, all_pixels=args.all, tracer=tracer, tell=tell
         )

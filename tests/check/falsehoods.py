@@ -801,6 +801,5 @@ def planted(root: Path, sort: str, kind: str) -> set[str]:
     plant, check = FALSEHOODS[sort][kind]
     plant(view_of(root))
     sign(root, house_of(root))
-    tracer = LightAgain(root) if check == "light traced" else None
-    counts = verify(root, tracer=tracer).counts
+    counts = verify(root, tracer=LightAgain if check == "light traced" else None).counts
     return {name for name, count in counts.items() if count.failed}

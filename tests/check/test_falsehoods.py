@@ -60,7 +60,7 @@ def finished_root(tmp_path_factory: pytest.TempPathFactory) -> Root:
 @pytest.mark.parametrize("sort", SORTS)
 def test_a_true_root_is_clean(finished_root: Root, sort: str) -> None:
     root = finished_root(sort)
-    certificate = verify(root, all_pixels=True, tracer=LightAgain(root))
+    certificate = verify(root, all_pixels=True, tracer=LightAgain)
     assert certificate.is_clean, certificate.text()
 
 
@@ -68,7 +68,7 @@ def test_light_of_another_machine_is_not_traced_again(finished_root: Root, tmp_p
     root = Path(shutil.copytree(finished_root("finished"), tmp_path / "root"))
     tracer = LightAgain(root)
     tracer.__dict__["variant"] = "cuda_of_another"
-    certificate = verify(root, sample=10, tracer=tracer)
+    certificate = verify(root, sample=10, tracer=lambda _root: tracer)
     assert "light traced" not in certificate.counts
     assert any("this machine has cuda_of_another: not repeated" in n for n in certificate.notes)
 
@@ -196,7 +196,7 @@ def test_every_stored_field_and_layer_has_an_owner(finished_root: Root, sort: st
     root = finished_root(sort)
     houses = list(root.glob("houses/*"))
     assert fields.unowned(fields.stored_fields(root, houses)) == []
-    assert methods.unknown_files(root, houses) == []
+    assert methods.unknown_files([root, *houses]) == []
     assert methods.unowned_layers() == []
 
 

@@ -14,6 +14,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import pbrs_farm as pf
+from pbrs_farm.check.question_answers import wrong_answers
 from pbrs_farm.core.house import House, Item, MaterialKind
 from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.export_views import export, remarks_of
@@ -23,7 +24,6 @@ from pbrs_farm.export.questions.asking import Asker, Question, blind_scores, mea
 from pbrs_farm.export.questions.clips import Clip, Thing, is_countable
 from pbrs_farm.export.questions.kinds import KINDS, Draft, QuestionKind, bearing_deg
 from pbrs_farm.export.questions.references import references_of
-from tests.export.question_check import wrong_answers
 from tests.sample.sampled_rooms import box, room_house
 from tests.scene.homes import small_home
 

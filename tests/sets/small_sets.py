@@ -40,8 +40,8 @@ layers = ["colour", "depth"]
 """
 
 
-def small_set(folder: Path) -> Path:
-    """A set's file of two homes of two rooms."""
+def small_set(folder: Path, forms: str = "", size: str = "64x48") -> Path:
+    """A set's file of two homes of two rooms; forms: further tables of it. size: of its views."""
     folder.mkdir(parents=True, exist_ok=True)
     homes = []
     for k in range(2):
@@ -51,7 +51,12 @@ def small_set(folder: Path) -> Path:
         homes.append(folder / f"home{k}.glb")
         homes[-1].write_bytes(scene.glb())
     names = [str(home) for home in homes]
-    text = TEXT.replace("{homes}", str(names)).replace("{first}", str(names[:1]))
+    text = (
+        (TEXT + forms)
+        .replace("64x48", size)
+        .replace("{homes}", str(names))
+        .replace("{first}", str(names[:1]))
+    )
     (folder / "small.toml").write_text(text)
     return folder / "small.toml"
 

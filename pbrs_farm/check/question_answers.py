@@ -1,15 +1,14 @@
-"""Recomputes the answers of an export of questions from the stored files; imports nothing of pbrs_farm.
+"""Answers of an export of questions, recomputed from the stored files of its root.
 
-`python -m tests.export.question_check ROOT EXPORT` prints each wrong row and exits 1 if there is one.
-ROOT: the exported output folder. Distances come from points on house.glb's meshes, read with
-trimesh; everything else from view.json, house.json and the question's words.
+Effects: reads files. Distances come from points on house.glb's meshes, read with trimesh; everything else
+from view.json, house.json and the question's words. Imports no code of export.
 """
 
 from __future__ import annotations
 
 import json
 import re
-import sys
+from collections.abc import Container
 from functools import lru_cache
 from pathlib import Path
 from typing import Any, Final
@@ -18,6 +17,8 @@ import numpy as np
 import trimesh
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
+
+from pbrs_farm.images import array_from_png
 
 Array = NDArray[np.float64]
 
@@ -77,6 +78,11 @@ def _points_on(triangles: Array) -> Array:
     return np.unique(np.concatenate(done), axis=0)
 
 
+@lru_cache(maxsize=2)
+def _pixels(file: Path) -> NDArray[Any]:
+    return array_from_png(file.read_bytes(), str(file))
+
+
 @lru_cache(maxsize=1)
 def _home(file: Path) -> _Home:
     # Questions of a home follow each other.
@@ -86,15 +92,15 @@ def _home(file: Path) -> _Home:
 class _Scene:
     """The files of one question: its frames' view.json, its house."""
 
-    def __init__(self, root: Path, name: str) -> None:
+    def __init__(self, root: Path, name: str, kept: Container[tuple[str, str]] | None) -> None:
         house, _, view = name.partition("__")
         self.folder = root / "houses" / house
         names = [view] if view else sorted(p.name for p in (self.folder / "views").iterdir())
         tables = [json.loads((self.folder / "views" / n / "view.json").read_text()) for n in names]
         if not view:
-            tables = sorted(
-                (t for t in tables if "frame" in t and "left" not in t), key=lambda t: t["frame"]
-            )
+            frames = (t for t in tables if "frame" in t and "left" not in t)
+            tables = [t for t in frames if kept is None or (house, t["view"]) in kept]
+            tables.sort(key=lambda t: int(t["frame"]))
         self.views = tables
         self.house = json.loads((self.folder / "house.json").read_text())
         self.home = _home(self.folder / "house.glb")
@@ -112,6 +118,13 @@ class _Scene:
     def tree(self, instance: int) -> cKDTree:
         """A search tree of the same points."""
         return self.home.tree(self.rows[instance]["item"])
+
+    def depth(self, instance: int) -> float:
+        """Median depth of its pixels in the first view, mm; inf if unknown."""
+        folder = self.folder / "views" / self.views[0]["view"]
+        ids, depth = (_pixels(folder / f"{name}.png") for name in ("instance", "depth"))
+        values = depth[(ids == instance) & (depth > 0)]
+        return float(np.median(values)) if len(values) else np.inf
 
     def middle(self, instance: int) -> Array:
         """(x, z) of the middle of its box."""
@@ -135,8 +148,13 @@ def _word(row: dict[str, Any]) -> str:
     return re.sub(r"[\d ]+$", "", str(row["name"])).lower() if name.startswith("other") else name
 
 
-def wrong_answers(root: Path, export: Path) -> list[str]:
-    """A line for each question of EXPORT/questions.jsonl whose answer contradicts the files of ROOT."""
+def wrong_answers(
+    root: Path, export: Path, kept: Container[tuple[str, str]] | None = None
+) -> list[str]:
+    """A line for each question of EXPORT/questions.jsonl whose answer contradicts the files of ROOT.
+
+    kept: (house, view) of the frames of walks, None for all.
+    """
     scenes: dict[str, _Scene] = {}
     wrong = []
     for line in (export / "questions.jsonl").read_text("utf-8").splitlines():
@@ -144,7 +162,7 @@ def wrong_answers(root: Path, export: Path) -> list[str]:
         name = row["scene_name"]
         if name not in scenes:
             scenes.clear()
-            scenes[name] = _Scene(root, name)
+            scenes[name] = _Scene(root, name, kept)
         fault = _fault(scenes[name], row)
         if fault:
             wrong.append(f"{row['id']} {row['question_type']}: {fault}: {row['question']}")
@@ -155,7 +173,10 @@ def _fault(scene: _Scene, row: dict[str, Any]) -> str:
     kind, about = row["question_type"], row["instances"]
     truth = row["ground_truth"]
     if row["options"]:
-        truth = next(o for o in row["options"] if o.startswith(f"{truth}. "))[3:]
+        options = {option[0]: option[3:] for option in row["options"]}
+        if truth not in options:
+            return f"has no option {truth}"
+        truth = options[truth]
     if kind != "object_counting" and any(len(scene.namesakes(k)) != 1 for k in about):
         return "a word fits more than one thing"
     if kind == "object_counting":
@@ -197,9 +218,9 @@ def _fits(row: dict[str, Any], word: str) -> bool:
 def _gap_m(scene: _Scene, a: int, b: int) -> float:
     tree, points = scene.tree(b), scene.points(a)
     # A sample of the points bounds the distance, which excludes most others.
-    bound = float(tree.query(points[:: max(1, len(points) // 500)])[0].min())
+    bound = float(np.min(tree.query(points[:: max(1, len(points) // 500)])[0]))
     nearer = tree.query(points, distance_upper_bound=bound + 1e-9)[0]
-    return min(bound, float(nearer.min()))
+    return min(bound, float(np.min(nearer)))
 
 
 def _angle_deg(stand: Array, face: Array, to: Array) -> float:
@@ -262,12 +283,51 @@ def _fault_of_route(scene: _Scene, stops: list[int], turns: list[str]) -> str:
     return ""
 
 
-def main(words: list[str]) -> int:
-    """Print wrong answers; 1 if there are any."""
-    wrong = wrong_answers(Path(words[0]), Path(words[1]))
-    sys.stdout.write(("\n".join(wrong) or "all answers are right") + "\n")
-    return int(bool(wrong))
+def wrong_references(root: Path, export: Path) -> list[str]:
+    """A line for each phrase of EXPORT/refs.json that fits another item than its own, or none.
+
+    Nouns, sides, orders from the left and distances are judged; colours and supports are not.
+    """
+    document = json.loads((export / "instances.json").read_text("utf-8"))
+    rows = {row["id"]: row for row in document["annotations"]}
+    names = {image["id"]: image["file_name"] for image in document["images"]}
+    scene_of = lru_cache(maxsize=1)(lambda name: _Scene(root, name, None))
+    wrong = []
+    for ref in json.loads((export / "refs.json").read_text("utf-8")):
+        row, scene = rows[ref["ann_id"]], scene_of(Path(ref["file_name"]).stem)
+        stored = ref["image_id"], ref["category_id"], ref["file_name"]
+        if stored != (row["image_id"], row["category_id"], names[row["image_id"]]):
+            wrong.append(f"{ref['ref_id']}: its annotation is of another image or class")
+        for sentence in ref["sentences"]:
+            phrase = sentence["sent"]
+            is_whole = sentence["raw"] == phrase and sentence["tokens"] == phrase.split()
+            fault = _fault_of_phrase(scene, row["instance_id"], phrase)
+            if fault or not is_whole:
+                wrong.append(f"{ref['ref_id']}: {fault or 'has other tokens'}: {phrase}")
+    return wrong
 
 
-if __name__ == "__main__":
-    sys.exit(main(sys.argv[1:]))
+_ORDER: Final = ("leftmost", "second", "third", "fourth", "fifth")
+
+
+def _fault_of_phrase(scene: _Scene, instance: int, phrase: str) -> str:
+    row, names = scene.rows[instance], scene.namesakes(instance)
+    noun, best = phrase.removeprefix("the ").removesuffix(" from the left"), instance
+    if _fits(row, noun):
+        return "" if names == [instance] else "fits several items"
+    order = sorted(names, key=lambda k: int(sum(scene.rows[k]["box2d"][::2])))
+    first, _space, rest = noun.partition(" ")
+    before, _on, side = noun.rpartition(" on the ")
+    if first in (*_ORDER, "rightmost"):
+        noun, best = rest, order[-1 if first == "rightmost" else _ORDER.index(first)]
+    elif side in ("left", "right"):
+        noun, best = before, order[-1 if side == "right" else 0]
+    elif noun.endswith(" nearest to the camera"):
+        noun, best = noun.removesuffix(" nearest to the camera"), min(names, key=scene.depth)
+    elif noun.endswith(" farthest from the camera"):
+        noun, best = noun.removesuffix(" farthest from the camera"), max(names, key=scene.depth)
+    else:
+        noun = before or rest  # on a support, or of a colour
+    if not noun or not _fits(row, noun):
+        return "is of another noun"
+    return "" if best == instance else f"fits instance {best}"

@@ -1,0 +1,130 @@
+"""A view's stored files at the size of a form; no code of export. Effects: reads files."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from functools import cached_property
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.check.stored_set import MODES
+from pbrs_farm.check.stored_view import StoredView
+from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.core.layers import LAYER
+
+
+@dataclass(frozen=True)
+class FormTruth:
+    """A view as a form of that size has to show it."""
+
+    view: StoredView
+    size: tuple[int, int] | None  # (height, width); None as rendered
+
+    @property
+    def shape(self) -> tuple[int, int]:
+        """(height, width) of the form's pictures."""
+        return self.size or self.view.size
+
+    @cached_property
+    def facts(self) -> dict[str, Any]:
+        """view.json; size, K and instances at the form's size."""
+        (height, width), (full_h, full_w) = self.shape, self.view.size
+        k = self.view.k * np.array([[width / full_w], [height / full_h], [1.0]])
+        rows = [self._row(row) for row in self.view.table["instances"]]
+        return self.view.table | {
+            "width_px": width, "height_px": height, "K": k.tolist(), "instances": [r for r in rows if r["pixels"]],
+        }  # fmt: skip
+
+    @cached_property
+    def instance(self) -> NDArray[Any]:
+        """(H, W) the instances."""
+        return self.label("instance.png")
+
+    def rows(self) -> list[dict[str, Any]]:
+        """The rows of instances with a class."""
+        return [row for row in self.facts["instances"] if row["nyu40"]]
+
+    def _row(self, row: dict[str, Any]) -> dict[str, Any]:
+        y, x = np.nonzero(self.instance == row["id"])
+        if not len(x):
+            return row | {"pixels": 0}
+        left, top = int(x.min()), int(y.min())
+        right, bottom = int(x.max()) + 1, int(y.max()) + 1
+        box = [left, top, right, bottom]
+        n = {"pixels": len(x), "fraction": len(x) / self.instance.size}
+        return row | n | {"box2d": box, "bbox": [left, top, right - left, bottom - top]}
+
+    def label(self, file: str) -> NDArray[Any]:
+        """A label of the nearest pixels."""
+        array = self.view.png(file)
+        (height, width), (full_h, full_w) = self.shape, array.shape[:2]
+        rows = ((np.arange(height) + 0.5) * full_h / height).astype(int)
+        columns = ((np.arange(width) + 0.5) * full_w / width).astype(int)
+        return np.asarray(array[rows[:, None], columns])
+
+    def _mean(self, array: NDArray[Any]) -> F64:
+        """A picture at the form's size, each pixel the mean over its area."""
+        array = array.astype(np.float64)
+        if array.shape[:2] == self.shape:
+            return array
+        down, across = (_areas(n, of) for n, of in zip(self.shape, array.shape[:2], strict=True))
+        return np.asarray(np.einsum("ab,bc...,dc->ad...", down, array, across, optimize=True))
+
+    def opengl_normals(self) -> F64:
+        """Unit normals, x right, y up, z towards the camera; 0 for nothing."""
+        x, forward, up = np.moveaxis(self.label("normal.png") * (2 / 65535) - 1, -1, 0)
+        normal = np.stack([x, up, -forward], axis=-1)
+        length = np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-9)
+        is_valid = (self.label("valid.png") > 0)[..., None]
+        return np.asarray(np.where(is_valid, normal / length, 0))
+
+    def array(self, name: str) -> NDArray[Any] | None:
+        """A picture by its mode, or a layer; None for one that is not recomputed at that size."""
+        if name in MODES:
+            return self._mean(self.view.png(f"{name}.png"))
+        layer = LAYER.get({"class40": "semantic"}.get(name, name))
+        if layer is None or not layer.file.endswith(".png"):
+            return None
+        if self.size is None or layer.resized == "nearest":
+            return self.label(layer.file)
+        if layer.resized != "lines":
+            return None
+        lines = self.view.png(layer.file)
+        of_values = [value * (self._mean(lines == value) > 0) for value in np.unique(lines)]
+        return np.asarray(np.max(of_values, axis=0))
+
+    def mode(self, modes: Collection[str]) -> str | None:
+        """The mode of its picture among modes; None without one."""
+        return next((m for m in MODES if m in modes and self.view.has(f"{m}.png")), None)
+
+
+def _areas(n: int, of: int) -> F64:
+    """(n, of) shares of pixels of a line of `of` in each of n."""
+    edges = np.arange(n + 1) * of / n
+    low, high = edges[:-1, None], edges[1:, None]
+    pixel = np.arange(of)
+    return np.clip(np.minimum(high, pixel + 1) - np.maximum(low, pixel), 0, None) / (high - low)
+
+
+def mask_from_runs(runs: dict[str, Any]) -> Bools:
+    """(H, W) mask of COCO's compressed run lengths: digits of 5 bits, from the fourth on differences to the last but one."""
+    counts: list[int] = []
+    value = shift = 0
+    for letter in str(runs["counts"]).encode():
+        digit = letter - 48
+        value |= (digit & 31) << shift
+        shift += 5
+        if digit & 32:
+            continue
+        if digit & 16:
+            value -= 1 << shift
+        counts.append(value + counts[-2] if len(counts) > 2 else value)
+        value = shift = 0
+    height, width = (int(n) for n in runs["size"])
+    if min(counts, default=0) < 0 or sum(counts) != height * width:
+        return np.zeros((0, 0), bool)
+    flat = np.repeat(np.arange(len(counts)) % 2 == 1, counts)
+    return flat.reshape(width, height).T
