@@ -36,6 +36,7 @@ _OWN_WORDS: Final = {
     "curtain": {"curtains": "set of curtains"},
     "lamp": {word: word for word in ("candle", "candlestick")},
     "television": {"monitor": "monitor"},
+    "towel": {"towels": "stack of towels"},
 }
 _NOUNS_OF_KINDS: Final = {"plant": "plant", "stairs": "staircase", "person": "person"}
 _PLAIN_NAME: Final = re.compile(r"[A-Za-z]{2,12}(?: [A-Za-z]{2,12})?")

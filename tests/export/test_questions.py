@@ -290,7 +290,8 @@ def test_a_relative_accuracy_is_the_share_of_thresholds_passed():
 
 def test_a_phrase_fits_exactly_one_item():
     rows = [
-        {"id": k, "box2d": [x, 0, x + 24, 24]} for k, x in ((1, 5), (2, 60), (3, 30), (4, 80))
+        {"id": k, "box2d": [x, 0, x + 24, 24], "truncated": False}
+        for k, x in ((1, 5), (2, 60), (3, 30), (4, 80))
     ]  # fmt: skip
     table, sofa = visible_item(3, "table", 4, 4, (1.5, 0.7, 1.5)), visible_item(4, "sofa", 7, 7)
     on_table = visible_item(2, "vase", 4, 4, (0.2, 0.3, 0.2), y=0.7)
@@ -306,14 +307,18 @@ def test_a_phrase_fits_exactly_one_item():
     ("noun", "side_px", "seen", "neighbour"),
     [
         ("vase", 23, {}, None), ("vase", 24, {"most_visible": 0.5}, None), ("ornament", 24, {}, None),
-        ("vase", 24, {"first_seen": None}, None), ("vase", 24, {}, ("bin", 5)), ("cabinet", 24, {}, ("cabinet", 1.52)),
+        ("vase", 24, {"first_seen": None}, None), ("vase", 24, {"is_cut": True}, None), ("door", 24, {}, None),
+        ("vase", 24, {}, ("bin", 5)), ("cabinet", 24, {}, ("cabinet", 1.52)),
     ],
 )  # fmt: skip
 def test_no_phrase_names_an_item_that_a_person_cannot_recognize(noun, side_px, seen, neighbour):
-    def phrased(noun: str, side_px: int, others: list[Thing], **seen: Any) -> set[int]:
+    def phrased(
+        noun: str, side_px: int, others: list[Thing], is_cut: bool = False, **seen: Any
+    ) -> set[int]:
         items = [visible_item(1, noun, 1, 1, **seen), *others]
         rows = [
-            {"id": t.instance, "box2d": [0, 0, side_px + 60 * k, 70]} for k, t in enumerate(items)
+            {"id": t.instance, "box2d": [0, 0, side_px + 60 * k, 70], "truncated": is_cut}
+            for k, t in enumerate(items)
         ]
         clip = clip_of(*items, facts={"instances": rows, "width_px": 200})
         return {reference.instance for reference in references_of(clip)}
@@ -322,6 +327,20 @@ def test_no_phrase_names_an_item_that_a_person_cannot_recognize(noun, side_px, s
     assert not phrased(noun, side_px, others, **seen)
     assert phrased("vase", 24, [visible_item(2, "sofa", 5, 1)]) == {1, 2}
     assert phrased("cabinet", 24, [visible_item(2, "cabinet", 5, 1)]) == {1, 2}
+
+
+def test_three_items_have_an_order_only_side_by_side():
+    def phrases(width_px: int) -> set[str]:
+        rows = [
+            {"id": k, "box2d": [x, 0, x + width_px, 50], "truncated": False}
+            for k, x in ((1, 5), (2, 40), (3, 70))
+        ]
+        vases = [visible_item(k, "vase", k, 1, (0.2, 0.3, 0.2)) for k in (1, 2, 3)]
+        return {r.phrase for r in references_of(clip_of(*vases, facts={"instances": rows}))}
+
+    ordered = {"the leftmost vase", "the second vase from the left", "the rightmost vase"}
+    assert phrases(30) == ordered
+    assert phrases(40) == set()
 
 
 def test_a_basket_is_no_box_and_a_candle_no_lamp():
@@ -338,7 +357,7 @@ def test_a_basket_is_no_box_and_a_candle_no_lamp():
     ],
 )  # fmt: skip
 def test_a_phrase_names_the_colour_of_a_coloured_item(kind, rgb, colour):
-    row = {"id": 1, "box2d": [0, 0, 30, 30]}
+    row = {"id": 1, "box2d": [0, 0, 30, 30], "truncated": False}
     clip = clip_of(visible_item(1, "cabinet", 1, 1), facts={"instances": [row]})
     layers = {
         "instance": np.ones((10, 10), np.uint16),

@@ -213,24 +213,25 @@ class Clip:
 
 @dataclass(frozen=True, slots=True)
 class _Shape:
-    """shape: what the nouns have in common. nouns: separated by |."""
+    """A row of look_alikes.csv; its head explains the columns."""
 
     shape: str
-    nouns: str
+    named: str
+    also: str = ""
 
 
 @cache
 def look_alikes() -> dict[str, set[str]]:
-    """Recognizable noun -> the other nouns with a similar shape, from look_alikes.csv.
+    """Noun -> the other nouns with a similar shape, for the nouns that phrases name.
 
     >>> "jar" in look_alikes()["vase"], "ornament" in look_alikes()
     (True, False)
     """
     others: dict[str, set[str]] = defaultdict(set)
     for row in read_csv(Path(__file__).with_name("look_alikes.csv"), _Shape):
-        group = row.nouns.split("|")
-        for noun in group:
-            others[noun].update(set(group) - {noun})
+        named = row.named.split("|")
+        for noun in named:
+            others[noun].update({*named, *row.also.split("|")} - {noun})
     return dict(others)
 
 

@@ -10,6 +10,7 @@ from collections import Counter
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from functools import cached_property
+from itertools import pairwise
 from typing import Any, Final
 
 import numpy as np
@@ -75,15 +76,18 @@ class _Picture:
     def is_recognizable(self, thing: Thing) -> bool:
         """True if a person sees what the item is, and where it ends.
 
-        Its noun has a familiar shape, and no noticeable item of another noun has a similar one; it is large
-        and mostly visible, and does not touch an item of its noun. All of a user's classes are familiar.
+        Its noun has a familiar shape, and no noticeable item of another noun has a similar one; it is large,
+        mostly visible and not cut by the picture's edge, and does not touch an item of its noun. All of a
+        user's classes are familiar.
         """
         if self.view.choice.classes is None and thing.noun not in look_alikes():
             return False
-        x0, y0, x1, y1 = self.rows[thing.instance]["box2d"]
+        row = self.rows[thing.instance]
+        x0, y0, x1, y1 = row["box2d"]
         is_clear = thing.first_seen is not None and thing.most_visible >= _RECOGNIZED
         return (
             is_clear
+            and not row["truncated"]
             and min(x1 - x0, y1 - y0) >= _LEAST_SIDE_PX
             and not self.clip.has_look_alike(thing.noun)
             and not any(
@@ -93,10 +97,14 @@ class _Picture:
             )
         )
 
+    def columns(self, thing: Thing) -> tuple[float, float]:
+        """Left and right edge of an item's box in the picture, as shares of the width."""
+        box, width = self.rows[thing.instance]["box2d"], float(self.view.facts["width_px"])
+        return box[0] / width, box[2] / width
+
     def column(self, thing: Thing) -> float:
         """Centre of an item's box in the picture, as a share of the width."""
-        box = self.rows[thing.instance]["box2d"]
-        return float(box[0] + box[2]) / 2 / float(self.view.facts["width_px"])
+        return sum(self.columns(thing)) / 2
 
     def distance_m(self, thing: Thing) -> float:
         """Median depth of an item's pixels; NaN if unknown."""
@@ -217,6 +225,10 @@ def _by_side(
     row = sorted(namesakes, key=picture.column)
     columns = [picture.column(t) for t in row]
     if min(np.diff(columns)) < _APART or len(row) > len(_ORDINALS):
+        return
+    # Three items and more have an order only side by side.
+    edges = [picture.columns(t) for t in row]
+    if len(row) > 2 and any(right > left for (_, right), (left, _) in pairwise(edges)):
         return
     yield f"the {noun} on the left" if len(row) == 2 else f"the leftmost {noun}", row[0]
     yield f"the {noun} on the right" if len(row) == 2 else f"the rightmost {noun}", row[-1]
