@@ -130,7 +130,7 @@ test-manual: setup ## what the pages show, by the marks of their blocks: command
 
 test-notebooks: setup ## the notebooks of docs/notebooks run to their end in a kernel; installs one the first time
 	@$(call extra,nbclient nbformat ipykernel,notebooks)
-	$(BIN)/pytest -m notebooks tests/docs/test_notebooks.py
+	$(BIN)/pytest -v -s -m notebooks tests/docs/test_notebooks.py
 
 test-cuda: export PBRS_SETUP_ALSO := gcc
 test-cuda: setup ## the tests marked gpu without a GPU: what one would run is translated for the CPU, all but OpenGL

@@ -21,6 +21,7 @@ from pbrs_farm.commands.arguments import Handler, echo, warn
 from pbrs_farm.commands.command_line import VERBS, Parser, unknown_words, verb_first
 from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.shown_text import did_you_mean
+from pbrs_farm.crash_notes import waiting_lines
 from pbrs_farm.installation import EXTRA_OF, install_command
 
 # Module of pbrs_farm.commands -> its verbs, in the order of the help.
@@ -106,7 +107,11 @@ def _run_parsed(words: Sequence[str], verb: str, module: str | None) -> int:
     if not hasattr(args, "handler"):
         parser.print_help()
         return 2
-    return _handled(args)
+    if module not in OF_STRANGERS:
+        return _handled(args)
+    # Commands of other modules are short, or run until they are stopped.
+    with waiting_lines(verb):
+        return _handled(args)
 
 
 def _start_early(words: Sequence[str]) -> None:

@@ -19,12 +19,15 @@ from rich.progress import (
     MofNCompleteColumn,
     Progress,
     ProgressColumn,
+    Task,
     TaskProgressColumn,
     TextColumn,
     TimeElapsedColumn,
 )
+from rich.text import Text
 
 from pbrs_farm.core.shown_text import printable
+from pbrs_farm.crash_notes import current_step, display_shown, waiting_lines
 from pbrs_farm.run.processes.render_task import Event
 
 ShareTeller: TypeAlias = "Callable[[str, float], None]"
@@ -42,10 +45,12 @@ class ProgressReporter(ABC):
     """Reports a run's events: call it with each event inside its `with` block."""
 
     def __enter__(self) -> ProgressReporter:
+        self._display = display_shown()
+        self._display.__enter__()
         return self
 
     def __exit__(self, *_error: object) -> None:
-        return None
+        self._display.__exit__(None, None, None)
 
     @abstractmethod
     def __call__(self, event: Event) -> None: ...
@@ -268,12 +273,13 @@ class _Bars(ProgressReporter):
 
     def __enter__(self) -> ProgressReporter:
         self._progress.start()
-        return self
+        return super().__enter__()
 
     def __exit__(self, *_error: object) -> None:
         self._progress.refresh()
         self._progress.update(self._views, note="")
         self._progress.stop()
+        super().__exit__()
 
     def __call__(self, event: Event) -> None:
         self._left.hear(event, time.monotonic())
@@ -305,14 +311,23 @@ class _Bars(ProgressReporter):
         return rate if left_s is None else f"{rate} {seconds_text(left_s)} left"
 
 
-def _bars(done: ProgressColumn | None = None) -> Progress:
-    """Bars on standard error: noun, bar, progress (n of n), time, note."""
+class _StepColumn(ProgressColumn):
+    """The step in progress, which changes between two updates of the bar."""
+
+    def render(self, task: Task) -> Text:
+        """Shown beside the note of the task."""
+        return Text(current_step())
+
+
+def _bars(done: ProgressColumn | None = None, *more: ProgressColumn) -> Progress:
+    """Bars on standard error: noun, bar, progress (n of n), time, note, more columns."""
     return Progress(
         TextColumn("{task.description:<7}"),
         BarColumn(),
         done or MofNCompleteColumn(),
         TimeElapsedColumn(),
         TextColumn("{task.fields[note]}"),
+        *more,
         console=Console(stderr=True),
         # Output to a file or pipe is not redirected while a bar is shown.
         redirect_stdout=sys.stdout.isatty(),
@@ -321,14 +336,15 @@ def _bars(done: ProgressColumn | None = None) -> Progress:
 
 @contextmanager
 def counting_bar(noun: str) -> Iterator[CountTeller]:
-    """Show a bar on standard error while items are counted; no bar if it is not a terminal.
+    """Show a bar on standard error while items are counted; a line every 30 s if it is not a terminal.
 
     Yields a callback that takes the number of finished items and, if known, their total.
     """
     if not sys.stderr.isatty():
-        yield lambda _n, _of=None: None
+        with waiting_lines(noun) as tell_count:
+            yield lambda n, of=None: tell_count(f"{n}{'' if of is None else f' of {of}'} {noun}")
         return
-    with _bars() as bar:
+    with display_shown(), _bars(None, _StepColumn()) as bar:
         task, began_s = bar.add_task(noun, total=None, note=""), time.monotonic()
 
         def tell(n: int, of: int | None = None) -> None:
@@ -343,13 +359,14 @@ def counting_bar(noun: str) -> Iterator[CountTeller]:
 
 @contextmanager
 def share_bar(noun: str) -> Iterator[ShareTeller]:
-    """Show a bar on standard error for one long task; no bar if it is not a terminal.
+    """Show a bar on standard error for one long task; a line every 30 s if it is not a terminal.
 
     Yields a callback that takes the current step and the finished share of the whole task (0..1).
     """
     if not sys.stderr.isatty():
-        yield lambda _doing, _share: None
+        with waiting_lines(noun) as tell_share:
+            yield lambda _doing, share: tell_share(f"{100 * share:.0f} %")
         return
-    with _bars(TaskProgressColumn()) as bar:
+    with display_shown(), _bars(TaskProgressColumn()) as bar:
         task = bar.add_task(noun, total=1.0, note="")
         yield lambda doing, share: bar.update(task, completed=share, note=doing)

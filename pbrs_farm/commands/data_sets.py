@@ -40,7 +40,7 @@ def _make(args: argparse.Namespace) -> int:
     from pbrs_farm.run.processes.render_task import Event
     from pbrs_farm.run.request import ProcessLimitOptions
     from pbrs_farm.sets.data_set import WHOLE, shard_from_text
-    from pbrs_farm.sets.make_set import claim_folder, finish_set, part_run
+    from pbrs_farm.sets.make_set import claim_folder, finish_set, part_run, take_prepared
     from pbrs_farm.settings import settings_from_environment
 
     how = request_from(args, ProcessLimitOptions)
@@ -49,7 +49,7 @@ def _make(args: argparse.Namespace) -> int:
     claim_folder(out, data_set)
     planned: dict[str, dict[str, list[str]]] = {}
     n_failed = n_lost = 0
-    for part in data_set.parts:
+    for number, part in enumerate(data_set.parts):
         views = planned.setdefault(part.name, {})
 
         def observe(event: Event, views: dict[str, list[str]] = views) -> None:
@@ -61,6 +61,7 @@ def _make(args: argparse.Namespace) -> int:
             continue
         if not args.json:
             echo(f"{part.name}: {counted(len(run.homes), 'home')}")
+        take_prepared(part, data_set.parts[:number], out, shard)
         n_houses = len(run.homes) * max(1, len(part.dress_seeds))
         summary = run_and_report(run, n_houses, as_json=args.json, observe=observe)
         n_failed += len(summary.failures)

@@ -25,6 +25,7 @@ from pbrs_farm.core.record import Record
 from pbrs_farm.core.resampling import resized_any, resized_by_area, resized_nearest
 from pbrs_farm.core.shot import Shot
 from pbrs_farm.core.shown_text import hint_of_choice
+from pbrs_farm.crash_notes import note_step
 from pbrs_farm.formats.class_map import ClassMap
 from pbrs_farm.formats.layer_file import layer_bytes, layer_from_bytes
 from pbrs_farm.formats.output_folder import OutputHouse, ViewEntry
@@ -181,6 +182,7 @@ class ChosenView:
 
         BadInput if it is damaged or missing.
         """
+        note_step(f"{self.house.id}/{self.id}", f"export {name}")
         if name == _CLASSES and self.choice.classes is not None:
             return png_from_array(self.array(name))
         if self.choice.size is None:

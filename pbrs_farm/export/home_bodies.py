@@ -20,6 +20,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import Item, Material, Surface, corners_of_surfaces
 from pbrs_farm.core.joints import Joint, JointKind
+from pbrs_farm.crash_notes import note_step
 from pbrs_farm.geometry.convex_parts import close_parts, connected, slabs
 from pbrs_farm.geometry.opened import moved_surface
 from pbrs_farm.home.masses import body_kg
@@ -63,6 +64,7 @@ class Body:
     @cached_property
     def colliders(self) -> tuple[F64, ...]:
         """Convex parts (V, 3) within 5 mm of its faces; () without a face."""
+        note_step(self.name, "convex parts")
         return _convex_parts(_Mesh(self.triangles)) if len(self.triangles) else ()
 
     @property

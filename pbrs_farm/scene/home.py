@@ -58,6 +58,7 @@ from pbrs_farm.core.house import House, Item, Room
 from pbrs_farm.core.recipe import Recipe, recipe_from_name, with_settings
 from pbrs_farm.core.shown_text import did_you_mean, shown
 from pbrs_farm.core.table import Table
+from pbrs_farm.crash_notes import waiting_lines
 from pbrs_farm.formats.cameras_json import views_from_json
 from pbrs_farm.prepare.source import SAVED_SUFFIX, resolve, saved_home, variants
 from pbrs_farm.prepare.source_ref import SourceRef
@@ -251,7 +252,9 @@ class Home:
         """
         from pbrs_farm.export.export_homes import export_house
 
-        export_house(self.house, Path(folder), to, **options)
+        house = self.house
+        with waiting_lines(f"{self.id} to {to}"):
+            export_house(house, Path(folder), to, **options)
         return Path(folder)
 
     @checked_call
@@ -397,7 +400,9 @@ class Home:
         targets = self._supports(in_) if on is None else self._supports_named(on)
         house = self.house
         edits: list[PlaceModel | FloatModel] = []
-        for model, matrix in self.renderer.call(lambda: poses(house, models, n, targets, seed)):
+        with waiting_lines(f"{self.id}: scatter"):
+            placed = self.renderer.call(lambda: poses(house, models, n, targets, seed))
+        for model, matrix in placed:
             name = self._free_name(model.id, [edit.item for edit in edits])
             kind = FloatModel if floating else PlaceModel
             rows = rows_of_matrix(matrix)
@@ -520,14 +525,15 @@ class Home:
         from pbrs_farm.scene.falling import recorded_falls
 
         house, ids = self.house, self._ids(items)
-        bodies = recorded_falls(
-            house,
-            ids,
-            seconds=seconds,
-            from_s=float(from_s),
-            push=np.asarray(push, np.float64),
-            spin=np.asarray(spin, np.float64),
-        )
+        with waiting_lines(f"{self.id}: drop"):
+            bodies = recorded_falls(
+                house,
+                ids,
+                seconds=seconds,
+                from_s=float(from_s),
+                push=np.asarray(push, np.float64),
+                spin=np.asarray(spin, np.float64),
+            )
         return self._edited(RecordBodies(bodies=bodies))
 
     @checked_call

@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import contextlib
 import io
-import sys
 import zipfile
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -26,6 +25,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.house import House, Item, ItemKind, corners_of_surfaces
 from pbrs_farm.core.mesh import area_vectors
+from pbrs_farm.crash_notes import note_step
 from pbrs_farm.dress.supports import Support
 from pbrs_farm.dress.worktop import Worktop
 from pbrs_farm.geometry.convex_parts import convex_parts, hull_of
@@ -76,7 +76,8 @@ def settled_poses(
     parts = {thing.model: convex_parts_of(thing.model) for thing in things}
     statics = _static_solids(house, surfaces, size)
     waiting = list(things)
-    for _ in range(_ROUNDS):
+    for number in range(1, _ROUNDS + 1):
+        note_step(house.id, f"fall {number} of at most {_ROUNDS}")
         _lift(house, things, waiting, surfaces, rng)
         moving = _simulate(mujoco, things, parts, statics)
         waiting = [t for k, t in enumerate(things) if k in moving or _has_fallen(t)]
@@ -121,7 +122,7 @@ def _version_of(package: str) -> str:
 def convex_parts_of(model: Model) -> tuple[F64, ...]:
     """Convex parts of a model, (V, 3) vertices each in its frame; cached in memory and on disk.
 
-    CoACD may take a minute for a hollow model, so a terminal shows its name.
+    CoACD may take a minute for a hollow model.
     """
     triangles = np.ascontiguousarray(model.shape.triangles, np.float64)
     made_by = _PARTS_FORMAT + _version_of("coacd").encode()
@@ -132,8 +133,7 @@ def convex_parts_of(model: Model) -> tuple[F64, ...]:
             return tuple(arrays[key] for key in sorted(arrays.files))
     except (OSError, EOFError, ValueError, zipfile.BadZipFile):
         pass  # not cached, or damaged
-    if sys.stderr.isatty():
-        sys.stderr.write(f"convex parts of {model.id} ({len(triangles)} faces) ...\n")
+    note_step(model.id, f"convex parts of {len(triangles):,} faces")
     parts = convex_parts(triangles)
     data = io.BytesIO()
     named: dict[str, Any] = {f"{k:03}": part for k, part in enumerate(parts)}

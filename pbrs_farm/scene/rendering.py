@@ -22,6 +22,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Camera, View
 from pbrs_farm.core.errors import MachineFailed
 from pbrs_farm.core.recipe import Recipe
+from pbrs_farm.crash_notes import waiting_lines
 from pbrs_farm.formats.cameras_json import cameras_json, views_from_json
 from pbrs_farm.formats.marker import copy_done
 from pbrs_farm.formats.serialise import json_bytes
@@ -72,7 +73,8 @@ class Renderer:
         with self._lock:
             finished = self._finished.get(key)
         if finished is None:
-            finished = self.call(lambda: self._house(source, recipe))
+            with waiting_lines(source.house_id):
+                finished = self.call(lambda: self._house(source, recipe))
         with self._lock:
             self._finished[key] = finished
             self._finished.move_to_end(key)
@@ -85,7 +87,8 @@ class Renderer:
 
         Reads and dresses the home first if necessary.
         """
-        return self.call(lambda: self._cameras(source, recipe))
+        with waiting_lines(source.house_id):
+            return self.call(lambda: self._cameras(source, recipe))
 
     def frames(
         self,

@@ -18,19 +18,24 @@ import io
 import json
 import shutil
 from collections.abc import Callable, Iterator, Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, Final
 
 import pbrs_farm
 from pbrs_farm.core import keys
-from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.errors import BadInput, PbrsError
 from pbrs_farm.core.house_split import split_of_house
 from pbrs_farm.curate.teaching_rules import RuleVerdict, judged_by, write_verdicts
 from pbrs_farm.export.export_views import export
 from pbrs_farm.formats.manifest import lines_by_house, sha256_by_key
+from pbrs_farm.formats.marker import copy_done
 from pbrs_farm.formats.output_folder import views_of
+from pbrs_farm.prepare.source import resolve, variants
+from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.regular_files import digest_of_regular, fault_of, read_regular
+from pbrs_farm.run import plan
 from pbrs_farm.run.local_run import Run
 from pbrs_farm.run.request import ProcessLimitOptions
 from pbrs_farm.sets.data_set import DataSet, SetForm, SetPart
@@ -110,6 +115,30 @@ def part_run(
         store=replace(store, layout="files"),
         dress_seeds=part.dress_seeds,
     )
+
+
+def take_prepared(
+    part: SetPart, earlier: Sequence[SetPart], out: Path, shard: tuple[int, int]
+) -> None:
+    """Copy finished steps of a part's homes from the roots of earlier parts that have the same homes.
+
+    Prepares each home of a set once. The run compares the digests of the copies, and repeats steps with
+    other inputs. Unreadable homes are left to the run.
+    """
+    to, files = FolderStore(root_of(part, out)), SourceFiles()
+    seeds = part.dress_seeds or (part.recipe.dress.seed,)
+    for other in earlier:
+        groups = plan.STEPS["house"].groups
+        if part.recipe.digest(*groups) != other.recipe.digest(*groups):
+            continue
+        store, homes = FolderStore(root_of(other, out)), set(other.homes)
+        for word in filter(homes.__contains__, part.homes_of(shard)):
+            with suppress(PbrsError):
+                for source in variants(resolve(word, files, models=part.models), seeds):
+                    for step in plan.house_steps(part.want, source.house_id):
+                        key = keys.marker_key(source.house_id, step)
+                        if to.head(key) is None:
+                            copy_done(store, to, key)
 
 
 def root_of(part: SetPart, out: Path) -> Path:

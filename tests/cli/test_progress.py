@@ -3,9 +3,12 @@
 from __future__ import annotations
 
 import io
+import re
+import time
 
 import pytest
 
+from pbrs_farm.crash_notes import display_shown, note_step, waiting_lines
 from pbrs_farm.progress import TimeLeft, counting_bar, progress_reporter, seconds_text, share_bar
 from pbrs_farm.run.processes.render_task import Event
 
@@ -175,6 +178,45 @@ def test_counted_work_has_a_bar_only_on_a_terminal(
         for n in range(3):
             tell(n, 2)
     assert "2/2" in terminal.getvalue()
+
+
+def test_a_long_call_says_regularly_where_it_is(capsys: pytest.CaptureFixture[str]) -> None:
+    with waiting_lines("scatter", first_s=0.01, every_s=0.01):
+        note_step("homes/flat.sh3d", "repair")
+        with counting_bar("views") as tell:
+            tell(3, 40)
+            assert _line_within(capsys, 5.0) == "scatter: 3 of 40 views, flat.sh3d: repair, 0 s"
+        with display_shown():
+            time.sleep(0.05)
+            capsys.readouterr()
+            time.sleep(0.05)
+            assert capsys.readouterr() == ("", "")
+        assert _line_within(capsys, 5.0) == "scatter: flat.sh3d: repair, 0 s"
+    capsys.readouterr()
+    time.sleep(0.05)
+    assert capsys.readouterr() == ("", "")
+
+
+def _line_within(capsys: pytest.CaptureFixture[str], seconds: float) -> str:
+    """The last line on standard error, without the seconds that a slow machine adds."""
+    capsys.readouterr()
+    end_s = time.monotonic() + seconds
+    while time.monotonic() < end_s:
+        time.sleep(0.02)
+        if lines := capsys.readouterr().err.splitlines():
+            return re.sub(r"\d+ s$", "0 s", lines[-1])
+    return ""
+
+
+def test_bars_show_the_step_in_progress(monkeypatch: pytest.MonkeyPatch) -> None:
+    terminal = Terminal()
+    monkeypatch.setattr("sys.stderr", terminal)
+    monkeypatch.setenv("COLUMNS", "160")
+    monkeypatch.setenv("TERM", "xterm")
+    with counting_bar("views") as tell:
+        tell(0, 2)
+        note_step("homes/flat.sh3d", "dress")
+    assert "flat.sh3d: dress" in terminal.getvalue()
 
 
 def test_items_of_unknown_number_are_counted_too(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import re
+import sys
 from pathlib import Path
 from typing import Any
 
@@ -58,7 +59,9 @@ def test_a_notebook_runs_to_its_end(
     # This environment has the package already.
     book.cells = [cell for cell in book.cells if cell.source != PIP]
     resources = {"metadata": {"path": str(tmp_path)}}
-    NotebookClient(book, timeout=170, kernel_name="python3", resources=resources).execute()
+    client = NotebookClient(book, timeout=170, kernel_name="python3", resources=resources)
+    client.on_cell_start = lambda cell_index, **_cell: sys.stderr.write(f"cell {cell_index}\n")
+    client.execute()
     outputs = [output for cell in book.cells for output in cell.get("outputs", ())]
     assert not [o for o in outputs if o.get("name") == "stderr"]
     shown = [o["data"] for o in outputs if "data" in o]
@@ -74,6 +77,7 @@ def test_the_notebooks_run_after_pip_without_root_llvm_or_opengl(tmp_path: Path)
     python = bare.environment("env")
     bare.run([python, "-m", "pip", "install", "-q", "nbclient", "ipykernel"]).check_returncode()
     for notebook in NOTEBOOKS:
+        sys.stderr.write(f"{notebook.stem}\n")
         # The first notebook's first cell installs the package.
         shown = bare.notebook(python, notebook, variables)
         assert not [line for line in shown if line.startswith("error")], notebook.stem

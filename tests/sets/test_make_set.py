@@ -81,6 +81,16 @@ def test_the_card_counts_the_views(finished_set: Path) -> None:
     assert digests(finished_set)["small.toml"] in card
 
 
+def test_a_home_of_two_parts_is_prepared_once(finished_set: Path) -> None:
+    (marker,) = finished_set.glob("parts/panoramas/houses/*/done/house.json")
+    house = marker.parents[1].name
+    # Markers hold the time of the step.
+    assert (
+        marker.read_bytes()
+        == (finished_set / f"parts/views/houses/{house}/done/house.json").read_bytes()
+    )
+
+
 def test_a_second_call_does_nothing(
     file: Path, finished_set: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
