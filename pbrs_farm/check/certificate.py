@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections import Counter
 from collections.abc import Callable
 from functools import partial
 
@@ -115,6 +116,7 @@ class Tally:
         self._listed: dict[str, list[str]] = {}  # check -> lines of failures
         self.notes: list[str] = []
         self.below = ""  # prefix of places: "parts/views/" within a set
+        self._left_out: Counter[str] = Counter()
         self._coincident: dict[tuple[str, str, str], int] = {}  # house and two items -> pixels
 
     def add(self, check: str, checked: int, *, ties: int = 0) -> None:
@@ -146,6 +148,10 @@ class Tally:
         if len(listed) < MAX_LISTED:
             at = shown(f"{self.below}{place}", MAX_PLACE)
             listed.append(f"{check}: {at}: {shown(fault, MAX_MESSAGE)}")
+
+    def leave_out(self, what: str) -> None:
+        """List a fact that no check recomputes among those not looked at; equal ones are counted."""
+        self._left_out[what] += 1
 
     def note(self, text: str) -> None:
         """Report an oddity, which is not counted as a failure."""
@@ -192,6 +198,7 @@ class Tally:
         for check, (checked, _failed, ties) in other._counts.items():
             self.add(check, checked, ties=ties)
         self.notes += other.notes
+        self._left_out += other._left_out
 
     def totals(self, check: str) -> tuple[int, int]:
         """(checked, ties) of a check so far."""
@@ -223,7 +230,10 @@ class Tally:
             notes=tuple(self.notes),
             unfinished=unfinished,
             looked_at=tuple(shown(line, MAX_MESSAGE) for line in looked_at),
-            not_looked_at=tuple(shown(line, MAX_MESSAGE) for line in not_looked_at),
+            not_looked_at=tuple(
+                shown(line, MAX_MESSAGE)
+                for line in (*not_looked_at, *(f"{k} ({n})" for k, n in self._left_out.items()))
+            ),
             # The pairs that share the most pixels come first.
             coincident=tuple(
                 Coincidence(house=house, items=(a, b), pixels=n)

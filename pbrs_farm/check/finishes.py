@@ -72,13 +72,14 @@ def _has_coat(row: Mapping[str, Any]) -> bool:
     return row["kind"] != "shade" and (has_roughness(row) or is_shiny)
 
 
-def _has_metallic_colour(row: Mapping[str, Any]) -> bool:
+def has_metallic_colour(row: Mapping[str, Any]) -> bool:
+    """True if highlights give a material its colour."""
     kd, ks = (linear_from_srgb(row[name]) @ LUMINANCE for name in ("diffuse", "specular"))
     return bool(row["texture_id"] is None and ks > _LEAST_METAL and 4 * kd < ks)
 
 
 def _is_metal(row: Mapping[str, Any]) -> bool:
-    return row["kind"] not in _CLEAR and _has_coat(row) and _has_metallic_colour(row)
+    return row["kind"] not in _CLEAR and _has_coat(row) and has_metallic_colour(row)
 
 
 def _f0(row: Mapping[str, Any]) -> F64:
@@ -89,7 +90,7 @@ def _f0(row: Mapping[str, Any]) -> F64:
         return np.full(3, _DIELECTRIC)
     if not _has_coat(row):
         return np.zeros(3)
-    if _has_metallic_colour(row):
+    if has_metallic_colour(row):
         return np.asarray(ks / max(float((np.minimum(kd, _WHITEST) + ks).max()), 1))
     coat = 0.08 * np.clip(np.array(row["specular"], np.float64), 0, 1)
     return np.maximum(coat, _DIELECTRIC if has_roughness(row) else 0)

@@ -21,9 +21,9 @@ from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import Item, Material, Surface, corners_of_surfaces
 from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.crash_notes import note_step
-from pbrs_farm.geometry.convex_parts import close_parts, connected, slabs
+from pbrs_farm.geometry.convex_parts import close_parts, slabs
 from pbrs_farm.geometry.opened import moved_surface
-from pbrs_farm.home.masses import body_kg
+from pbrs_farm.home.masses import class_of_material, surfaces_kg
 
 _LEAST_KG, _MOST_KG = 0.05, 150.0
 BODY: Final = ""
@@ -45,7 +45,7 @@ class Body:
     """A rigid body of a piece, in the piece's frame, in the pose of the home.
 
     part: Surface.part; BODY of the piece's own body. joint: with the body, in the piece's frame; None of
-    the body. materials: of the house. nyu40: the class of its piece. is_wall: or floor, or ceiling.
+    the body. materials: of the house. nyu40: the class that suggests its material. is_wall: or floor, or ceiling.
     """
 
     name: str  # unique in the home: `Fridge`, `Fridge.door_1`
@@ -74,15 +74,11 @@ class Body:
 
     @cached_property
     def mass_kg(self) -> float:
-        """Its joint's, or from its materials (`home.masses.body_kg`), 0.05 to 150."""
+        """Its joint's, or from its materials (`home.masses.surfaces_kg`), 0.05 to 150."""
         if self.joint is not None and self.joint.mass_kg > 0:
             return max(self.joint.mass_kg, _LEAST_KG)
-        solids = (
-            (solid, self.materials[surface.material])
-            for surface in self.surfaces
-            for solid in connected(corners_of_surfaces((surface,)))
-        )
-        return float(np.clip(body_kg(solids, self.nyu40), _LEAST_KG, _MOST_KG))
+        mass = surfaces_kg(self.surfaces, self.materials, self.nyu40)
+        return float(np.clip(mass, _LEAST_KG, _MOST_KG))
 
     @cached_property
     def bounds(self) -> F64:
@@ -130,13 +126,14 @@ def bodies_of(
     moving = {joint.part for joint in item.joints}
     is_wall = item.kind.is_structure
     still = tuple(s for s in surfaces if s.part not in moving)
-    bodies = [Body(name, BODY, still, None, materials, item.nyu40, is_wall)]
+    nyu40 = class_of_material(item)
+    bodies = [Body(name, BODY, still, None, materials, nyu40, is_wall)]
     for joint in item.joints:
         of_part = tuple(s for s in surfaces if s.part == joint.part)
         if of_part:
             placed = joint.placed(local_from_world)
             part_name = f"{name}.{word_of(joint.part)}"
-            row = Body(part_name, joint.part, of_part, placed, materials, item.nyu40, is_wall)
+            row = Body(part_name, joint.part, of_part, placed, materials, nyu40, is_wall)
             bodies.append(row)
     return tuple(bodies)
 

@@ -16,10 +16,8 @@ import numpy as np
 from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.house import Material, MaterialKind, Surface
 from pbrs_farm.core.joints import Joint, JointKind
-from pbrs_farm.core.mesh import triangle_corners
 from pbrs_farm.generate.floor_plan import OpeningKind, PlanOpening
 from pbrs_farm.geometry.solids import Triple, boxes_surface
-from pbrs_farm.home.masses import mass_kg
 
 _FRAME_M: Final = 0.06  # breadth of a frame's posts
 _LEAF_M: Final = 0.04  # thickness of a door's leaf
@@ -138,15 +136,11 @@ def _with_joints(
     hung: Sequence[tuple[Joint, Sequence[Surface]]],
     materials: tuple[Material, ...],
 ) -> Shape:
-    """A shape of a static body and the parts that each joint moves, with its mass."""
-    surfaces, joints = list(body), []
+    """A shape of a static body and the parts that each joint moves."""
+    surfaces = list(body)
     for joint, moving in hung:
         surfaces += [replace(s, part=joint.part) for s in moving]
-        masses = [
-            mass_kg(triangle_corners(s.positions, s.faces), materials[s.material]) for s in moving
-        ]
-        joints.append(replace(joint, mass_kg=sum(masses)))
-    return Shape(tuple(surfaces), materials, joints=tuple(joints))
+    return Shape(tuple(surfaces), materials, joints=tuple(joint for joint, _moving in hung))
 
 
 def _frame_boxes(w: float, h: float, d: float, *, has_sill: bool) -> list[_Box]:

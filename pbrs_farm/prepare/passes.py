@@ -71,9 +71,11 @@ class Preparation:
 
     @property
     def finished(self) -> FinishedHouse:
-        """The result of the last pass."""
+        """The result of the last pass, with the masses of what opens."""
+        from pbrs_farm.home.masses import weighed
+
         assert self.report is not None
-        return FinishedHouse(self.house, self.report, self.dressing)
+        return FinishedHouse(weighed(self.house), self.report, self.dressing)
 
 
 _IsNeeded: TypeAlias = Callable[[SourceRef, Recipe], bool]

@@ -15,6 +15,7 @@ from pbrs_farm.core.layers import LAYER, OPTIONAL, OWN_LAYERS
 from pbrs_farm.formats.house_bundle import bundle_from_house
 from pbrs_farm.formats.manifest import manifest_from_markers
 from pbrs_farm.formats.marker import Marker, StoredFile
+from pbrs_farm.home.masses import weighed
 from pbrs_farm.images import exr_from_layers, png_from_array
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.builtin.builtin_home import builtin_home
@@ -52,7 +53,7 @@ def make_root(
     caster: Caster | None = None,
 ) -> Path:
     """Write the root and return its house folder; by default of the small home."""
-    home = home or builtin_home()
+    home = weighed(home or builtin_home())
     house = root / "houses" / home.id
     geometry = geometry_from_house(home)
     caster = caster or Caster.of_house(home, geometry)

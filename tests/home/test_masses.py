@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -9,7 +11,8 @@ from pbrs_farm.core import classes
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Material, MaterialKind, corners_of_surfaces
 from pbrs_farm.geometry.solids import box
-from pbrs_farm.home.masses import body_kg
+from pbrs_farm.home.masses import body_kg, weighed
+from pbrs_farm.read.builtin.builtin_home import builtin_home
 
 WOOD, CLOTH = Material("oak wood"), Material("fabric pillow")
 
@@ -37,7 +40,24 @@ def test_a_cushion_is_cloth_about_foam_and_an_open_sheet_its_area() -> None:
     assert mass == pytest.approx(300 * 0.003 * area + 40 * (volume - 0.003 * area), rel=1e-5)
     sheet = np.array([[[0.0, 0, 0], [1, 0, 0], [1, 0, 1]], [[0, 0, 0], [1, 0, 1], [0, 0, 1]]])
     steel = Material("brushed steel")
-    assert body_kg([(sheet, steel)], classes.OTHERPROP) == pytest.approx(7.85)
+    assert body_kg([(sheet, steel)], classes.OTHERPROP) == pytest.approx(7850 * 0.0006)
+
+
+@pytest.mark.parametrize("name", ["oak wood", "joinery"])
+def test_an_inner_door_weighs_as_a_light_core_between_skins(name: str) -> None:
+    mass = body_kg([(solid((0.86, 2.0, 0.04)), Material(name))], classes.DOOR)
+    assert 15 < mass < 30
+
+
+def test_parts_are_weighed_in_their_present_materials_and_a_stated_mass_remains() -> None:
+    house = builtin_home()
+    (k, door), *_ = ((k, i) for k, i in enumerate(house.items) if i.joints)
+    assert 15 < weighed(house).items[k].joints[0].mass_kg < 30
+    stated = replace(door.joints[0], mass_kg=3.0)
+    for source_class, mass in (("someone's door", 3.0), ("builtin#door", 21.298)):
+        item = replace(door, source_class=source_class, joints=(stated,))
+        (joint,) = weighed(house.with_items((item,))).items[0].joints
+        assert joint.mass_kg == pytest.approx(mass, abs=0.002)
 
 
 @pytest.mark.parametrize(

@@ -37,13 +37,11 @@ from pbrs_farm.core.classes import OTHERPROP
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.core.joints import Joint, JointKind
-from pbrs_farm.core.mesh import triangle_corners
 from pbrs_farm.dress.models import Model, Part, hanging_piece, standing_piece, transformed
 from pbrs_farm.dress.style import COLOURS, Rgb, Style
 from pbrs_farm.dress.thing_materials import WHITE, any_colour, glossy, metal, plain
 from pbrs_farm.furnishings.things.shapes import Shapes
 from pbrs_farm.geometry.outlines import Triple
-from pbrs_farm.home.masses import mass_kg
 
 P = ParamSpec("P")
 T = TypeVar("T")
@@ -234,15 +232,8 @@ class Maker(Shapes):
         self._joints.append(Joint(part, kind, at, axis, upper))
 
     def joints(self) -> tuple[Joint, ...]:
-        """The joints by the names of their parts, with the masses of the parts."""
-        return tuple(replace(joint, mass_kg=self._mass_kg(joint.part)) for joint in self._joints)
-
-    def _mass_kg(self, part: str) -> float:
-        return sum(
-            mass_kg(triangle_corners(solid.positions, solid.faces), material)
-            for solid, material in self._parts
-            if solid.part == part and material is not None
-        )
+        """The joints by the names of their parts, without masses."""
+        return tuple(self._joints)
 
     def finished(self, file: str, name: str) -> list[Part]:
         """All parts; BadInput if there are no parts, or one has no material."""

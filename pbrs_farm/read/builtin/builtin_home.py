@@ -209,7 +209,6 @@ def _plane_items(index: dict[str, int]) -> list[Item]:
 
 
 _LEAF: Final = "leaf 1"
-_LEAF_KG: Final = 42.0  # of wood, 40 mm thick
 
 
 def _openings(index: dict[str, int]) -> tuple[tuple[Opening, ...], list[Item]]:
@@ -243,9 +242,7 @@ def _hung(door: Item, width: float) -> Item:
     surfaces = tuple(
         replace(s, part=_LEAF) if s.name in ("wood", "metal") else s for s in door.surfaces
     )
-    joint = Joint(
-        _LEAF, JointKind.REVOLUTE, triple(position), (0.0, -1.0, 0.0), np.pi / 2, mass_kg=_LEAF_KG
-    )
+    joint = Joint(_LEAF, JointKind.REVOLUTE, triple(position), (0.0, -1.0, 0.0), np.pi / 2)
     return replace(door, surfaces=surfaces, joints=(joint,))
 
 

@@ -25,7 +25,6 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import Gltf, entry
 from pbrs_farm.home.names import names_glass, names_mirror
 from pbrs_farm.read.common.furniture_classes import PieceSize
-from pbrs_farm.read.common.joints_of_surfaces import joints_of_surfaces
 from pbrs_farm.read.common.material_library import PANE_OPACITY
 from pbrs_farm.read.common.name_classes import UNMAPPED, NodeClass, class_of_node_name
 from pbrs_farm.read.common.notes import Notes
@@ -251,9 +250,8 @@ def _item(
         shining = {k: emission for k, emission in shining.items() if k not in unknown}
     lights += emitted(surfaces, shining)
     item = _finish_item(thing, surfaces, lights, _box_of_thing(thing, parts))
-    moving = joints_of_surfaces(
-        dict.fromkeys(joints.values()), surfaces, materials.library.materials
-    )
+    parts = {s.part for s in surfaces}
+    moving = tuple(joint for joint in dict.fromkeys(joints.values()) if joint.part in parts)
     return replace(item, joints=moving) if moving else item
 
 

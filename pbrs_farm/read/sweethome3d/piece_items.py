@@ -16,7 +16,6 @@ from pbrs_farm.read.common.furniture_classes import (
     class_of_piece,
     kind_of,
 )
-from pbrs_farm.read.common.joints_of_surfaces import joints_of_surfaces
 from pbrs_farm.read.sweethome3d.door_cutouts import StandingWall, opening_of
 from pbrs_farm.read.sweethome3d.home_file.home_xml import PlanLevel, PlanPiece
 from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
@@ -79,6 +78,7 @@ def piece_item(
     item_id, level_id = ids
     is_opening, is_light = piece.frame is not None, piece.tag == "light"
     kind = kind_of(by_rule, nyu40, is_opening=is_opening, is_light=is_light)
+    parts = {s.part for s in surfaces}
     item = Item(
         id=item_id,
         name=piece.name,
@@ -91,7 +91,7 @@ def piece_item(
         lights=lights,
         box=frame.box,
         tags=tags,
-        joints=joints_of_surfaces(joints.values(), surfaces, materials.library.materials),
+        joints=tuple(joint for joint in joints.values() if joint.part in parts),
     )
     return item, frame
 

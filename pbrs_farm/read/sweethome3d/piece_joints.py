@@ -16,6 +16,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64, triple
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.joints import Joint, JointKind
+from pbrs_farm.core.mesh import face_areas
 from pbrs_farm.read.mesh.obj import Mesh
 from pbrs_farm.read.sweethome3d.home_file.home_xml import PlanPiece
 from pbrs_farm.read.sweethome3d.piece_models import fixed_joint_of, hanger_of, joint_of
@@ -26,6 +27,8 @@ _SHUT: Final = (
     1.5  # minimum ratio of a closed leaf's width to its depth; otherwise the leaf is open
 )
 _LEAST_TRAVEL_M: Final = 0.02
+_BESIDE_M: Final = 0.02  # least distance of a front from the middle of its body, metres
+_TINY_M2: Final = 1e-12
 _HANGERS: Final = {JointKind.REVOLUTE: "hinge", JointKind.PRISMATIC: "rail"}
 
 
@@ -50,43 +53,55 @@ def piece_joints(
             for name, joint in read_joints.items()
             if moves.get(name) != ()
         }
-    hung, fixed = _points_by_joint(meshes, matrix)
+    hung, fixed, still = _corners_by_joint(meshes, matrix)
     word = "leaf" if piece.frame is not None else "door"
+    # Furniture opens away from its body; a frame is on both sides of a door's leaf.
+    body = np.concatenate(still) if still and piece.frame is None else None
     joints: dict[str, Joint] = {}
     for name in sorted(hung.keys() & fixed.keys()):
         move = moves.get(name)
         if move == ():
             continue  # its leaf was left out
         part = f"{word} {len(joints) + 1}"
-        joint = _joint(part, name, hung[name], fixed[name])
+        joint = _joint(part, name, hung[name], fixed[name], body)
         if joint is not None:
             joints[name] = (_moved(joint, move, matrix) if move else joint).placed(to_world)
     return joints
 
 
-def _points_by_joint(meshes: Sequence[Mesh], matrix: F64) -> tuple[dict[str, F64], dict[str, F64]]:
-    """Points of the parts moved by each joint, and points of the hinge or rail itself."""
+def _corners_by_joint(
+    meshes: Sequence[Mesh], matrix: F64
+) -> tuple[dict[str, F64], dict[str, F64], list[F64]]:
+    """Corners (F, 3, 3) of the parts moved by each joint, of the hinge or rail itself, and of all else."""
     hung: dict[str, list[F64]] = {}
     fixed: dict[str, list[F64]] = {}
+    still: list[F64] = []
     for mesh in meshes:
-        if len(mesh.positions):
-            points = transform_points(matrix, mesh.positions)
+        if len(mesh.faces):
+            corners = transform_points(matrix, mesh.positions)[mesh.faces]
             if name := hanger_of(mesh.group):
-                hung.setdefault(name, []).append(points)
+                hung.setdefault(name, []).append(corners)
             elif name := fixed_joint_of(mesh.group):
-                fixed.setdefault(name, []).append(points)
+                fixed.setdefault(name, []).append(corners)
+            else:
+                still.append(corners)
     return (
         {name: np.concatenate(some) for name, some in hung.items()},
         {name: np.concatenate(some) for name, some in fixed.items()},
+        still,
     )
 
 
-def _joint(part: str, name: str, hung: F64, fixed: F64) -> Joint | None:
-    """The joint of shut points (N, 3) on a hinge or rail, in the piece's frame, in which +z is its front."""
+def _joint(part: str, name: str, hung: F64, fixed: F64, body: F64 | None) -> Joint | None:
+    """The joint of shut faces (F, 3, 3) on a hinge or rail, in the piece's frame, in which +z is its front.
+
+    body: (F, 3, 3) from which it opens away; None of a door or window.
+    """
+    fixed, points = fixed.reshape(-1, 3), hung.reshape(-1, 3)
     low, high = fixed.min(0), fixed.max(0)
     along = int(np.argmax(high - low))
     axis, middle = np.eye(3)[along], (low + high) / 2
-    least, most = hung.min(0), hung.max(0)
+    least, most = points.min(0), points.max(0)
     if not name.startswith("hinge"):
         # It slides to the side on which its rail goes on.
         ahead, back = high[along] - most[along], least[along] - low[along]
@@ -98,9 +113,12 @@ def _joint(part: str, name: str, hung: F64, fixed: F64) -> Joint | None:
     wide, thin = sorted((k for k in range(3) if k != along), key=lambda k: least[k] - most[k])
     if most[wide] - least[wide] < _SHUT * (most[thin] - least[thin]):
         return None
-    # The far end moves to the side on which the hinge protrudes from the leaf.
     away = np.sign((least + most)[wide] / 2 - middle[wide]) or 1.0
-    side = np.sign(middle[thin] - np.median(hung[:, thin])) or 1.0
+    # A leaf's middle is that of its area: handles have many faces, but small ones.
+    leaf = float(np.average(hung.mean(1)[:, thin], weights=face_areas(hung) + _TINY_M2))
+    beside = 0.0 if body is None else leaf - (body.min((0, 1)) + body.max((0, 1)))[thin] / 2
+    # Else the far end moves to the side on which the hinge protrudes from the leaf.
+    side = np.sign(beside if abs(beside) > _BESIDE_M else middle[thin] - leaf) or 1.0
     turn = np.cross(axis, np.eye(3)[wide])[thin] * away * side
     return Joint(part, JointKind.REVOLUTE, triple(middle), triple(turn * axis), _WIDE_OPEN_RAD)
 
