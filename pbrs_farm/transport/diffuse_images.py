@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F32, RadianceImage
+from pbrs_farm.core.arrays import F32, Bools, RadianceImage
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.transport.develop.mode_pictures import LinearAovs, denoise_aovs
 from pbrs_farm.transport.lamp_layers import layer_name
@@ -31,11 +31,14 @@ _GUIDE_GREY: Final = 0.5  # guide albedo for pixels without one
 _MOST_HALF: Final = 65504.0  # of a half float
 
 
-def add_diffuse_images(result: LightResult, sums: SampleSums, spp: int) -> LightResult:
+def add_diffuse_images(
+    result: LightResult, sums: SampleSums, spp: int, scatters: Bools
+) -> LightResult:
     """The result with the images of this module, by their names in radiance.exr.
 
     sums: of a render that splits diffuse light, over spp samples. Those of lamps are of the lamps
-    that have a layer.
+    that have a layer. scatters: (H, W) False where a pixel's centre shows glass or a mirror, whose edge
+    would else have light of its frame.
     """
     assert sums.diffuse_albedo is not None
     totals = {ALBEDO: sums.diffuse_albedo}
@@ -46,7 +49,7 @@ def add_diffuse_images(result: LightResult, sums: SampleSums, spp: int) -> Light
         totals[f"diffuse_{layer_name(number)}"] = sums.diffuse_lamps[:, number - 1]
     shape = result.outdoor.shape
     images = {
-        name: np.ascontiguousarray((total / np.float32(spp)).reshape(shape))
+        name: np.ascontiguousarray((total / np.float32(spp)).reshape(shape) * scatters[..., None])
         for name, total in totals.items()
     }
     return replace(result, diffuse=images)

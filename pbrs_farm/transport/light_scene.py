@@ -221,6 +221,7 @@ class LightScene:
         if self.variant.startswith("scalar"):
             return self._render_scalar(camera, fields, seed)
         mitsuba(self.variant)
+        from pbrs_farm.transport.kernels.camera_rays import scatters_first
         from pbrs_farm.transport.sample_passes import SampledView, path_sums
 
         emitters, weights = self._emitters_of_pilot(pilot, fields)
@@ -235,16 +236,19 @@ class LightScene:
                 raise RenderFailed(text, view=room_id, mode="light", seed=seed)
             return self._render_metropolis(view, room_id, checkpoint, facts)
         facts |= {"integrator": "path", "guided": weights.is_guided}
+        scatters = None
+        if splits_diffuse:
+            scatters = scatters_first(self.device_scene, replace(camera, blur=None))
         if fields.groups == "two":
             sums, spp = path_sums(view, checkpoint)
             result = result_from_sums(sums, camera, spp, facts)
-            return add_diffuse_images(result, sums, spp) if splits_diffuse else result
-        # Sum each lamp separately too, and split indoor light into layers.
-        n_lamps = self._n_lamps_that_fit(camera, room_id, seed)
-        sums, spp = path_sums(view, checkpoint, n_lamps=n_lamps)
-        result = result_from_sums(sums, camera, spp, facts)
-        result = add_lamp_layers(result, sums.lamps, spp, self.tables.lamps)
-        return add_diffuse_images(result, sums, spp) if splits_diffuse else result
+        else:
+            # Sum each lamp separately too, and split indoor light into layers.
+            n_lamps = self._n_lamps_that_fit(camera, room_id, seed)
+            sums, spp = path_sums(view, checkpoint, n_lamps=n_lamps)
+            result = result_from_sums(sums, camera, spp, facts)
+            result = add_lamp_layers(result, sums.lamps, spp, self.tables.lamps)
+        return result if scatters is None else add_diffuse_images(result, sums, spp, scatters)
 
     def _mover(self, camera: Camera, shutter_s: float) -> Callable[[float], None] | None:
         """Moves items to a share of the shutter's time; None if nothing moves."""

@@ -91,6 +91,18 @@ def test_mirrors_and_glass_and_surfaces_behind_them_have_no_shading(first):
     assert not any(image.any() for image in result.diffuse.values())
 
 
+@pytest.mark.parametrize("first", [MIRROR, GLASS], ids=lambda m: m.name)
+def test_pixels_at_the_edge_of_glass_have_no_shading(first):
+    # The sheet ends within the pixels of the middle column, beyond their centres.
+    below = rooms.quad([(-9, 0, 9), (9, 0, 9), (9, 0, -9), (-9, 0, -9)], 0)
+    above = rooms.quad([(-9, 0.5, 9), (0.05, 0.5, 9), (0.05, 0.5, -9), (-9, 0.5, -9)], 1)
+    sheets = rooms.house([below, above], [rooms.matte("grey", 0.5), first])
+    camera = rooms.camera((0, 2, 2), (0, 0, 0), 5, 5, 0.8)
+    diffuse = split(sheets, camera, uniform_sky(SKY), FIELDS).diffuse[ALBEDO].max(-1)
+    assert not diffuse[:, :3].any()
+    assert (diffuse[:, 3:] > 0.4).all()
+
+
 def test_light_is_the_same_as_without_and_is_kept_by_lamp():
     house, camera = rooms.window_room(lumen=800.0)
     fields = FIELDS.model_copy(update={"spp": 8, "groups": "lamps"})

@@ -13,9 +13,10 @@ import drjit as dr
 import mitsuba as mi
 import numpy as np
 
-from pbrs_farm.core.arrays import F32
+from pbrs_farm.core.arrays import F32, Bools
 from pbrs_farm.core.camera import Camera, CameraBlur, Intrinsics
 from pbrs_farm.transport.kernels.sampler import Sampler, device_array, opaque3
+from pbrs_farm.transport.scene_tables.material_rows import GLASS, MIRROR
 
 _LENS_DIM: Final = 1 << 24  # random dimensions far beyond those of any path's vertices
 _TIME_DIM: Final = _LENS_DIM + 2
@@ -156,11 +157,27 @@ def _turn_camera_vector(camera: LensCamera, v: Any, angle: Any) -> Any:
 
 def first_points(scene: Any, camera: Camera) -> F32:
     """(H * W, 3) surface point at each pixel's centre, row by row; infinite without a hit."""
+    si, _origin, _d = _first_hits(scene, camera)
+    p = dr.select(si.valid, si.p, dr.inf)
+    dr.eval(p)
+    return np.stack([axis.numpy() for axis in p], axis=-1)
+
+
+def scatters_first(scene: Any, camera: Camera) -> Bools:
+    """(H, W) False at pixels whose centre shows a mirror, glass or a pane of a window."""
+    si, origin, d = _first_hits(scene, camera)
+    if scene.panes is not None:
+        si, _is_pane, _is_inner = scene.panes.before(si, origin, d, mi.Bool(True))
+    is_clear = si.valid & ~si.is_cutout & ((si.bsdf.kind == GLASS) | (si.bsdf.kind == MIRROR))
+    dr.eval(is_clear)
+    i = camera.intrinsics
+    return np.asarray(~is_clear.numpy().astype(bool).reshape(i.height_px, i.width_px))
+
+
+def _first_hits(scene: Any, camera: Camera) -> tuple[Any, Any, Any]:
+    """The hits of the rays through the pixels' centres, and the rays."""
     width = dr.opaque(mi.UInt32, camera.intrinsics.width_px)
     pixel = dr.arange(mi.UInt32, camera.intrinsics.width_px * camera.intrinsics.height_px)
     corner = mi.Point2f(mi.Float(pixel % width), mi.Float(pixel // width))
     origin, d = camera_ray(device_camera(camera), corner, mi.Point2f(0.5), None)
-    si = scene.intersect(origin, d, mi.Bool(True))
-    p = dr.select(si.valid, si.p, dr.inf)
-    dr.eval(p)
-    return np.stack([axis.numpy() for axis in p], axis=-1)
+    return scene.intersect(origin, d, mi.Bool(True)), origin, d
