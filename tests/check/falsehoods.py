@@ -693,6 +693,28 @@ def joint(change: Callable[[dict], object]) -> Plant:
     return document("house.json", lambda h: change(open_one(h)))
 
 
+def alike(change: Callable[[dict], object]) -> Plant:
+    """Change the joint of the open door in house.json, and what articulation.json repeats of it."""
+
+    def plant(view: Path) -> None:
+        joint(change)(view)
+        home = json.loads((view.parents[1] / "house.json").read_text())
+        joints = [j for i in home["items"] for j in i.get("joints", [])]
+        pose = np.array(json.loads((view / "view.json").read_text())["world_from_camera_opencv"])
+
+        def repeat(table: dict) -> None:
+            for r in table["parts"]:
+                j = joints[r["id"] - 1]
+                r.update({k: j[k] for k in ("kind", "value", "lower", "upper", "mass_kg")})
+                r["axis_opencv"] = (np.array(j["axis"]) @ pose[:3, :3]).tolist()
+                away = np.array(j["point"]) - pose[:3, 3]
+                r["point_opencv"] = (away @ pose[:3, :3]).tolist()
+
+        json_file("articulation.json", repeat)(view)
+
+    return plant
+
+
 def moving(change: Callable[[dict], object]) -> Plant:
     """Change the first moving primitive of house.glb."""
 
@@ -718,6 +740,16 @@ _OPENED: dict[str, tuple[Plant, str]] = {
     "a hinge of house.json elsewhere": (joint(lambda j: j["point"].__setitem__(0, 20.0)), "joints"),
     "an invalid axis in house.json": (joint(lambda j: j.update(axis=[0.0, 2.0, 0.0])), "joints"),
     "another kind of joint": (joint(lambda j: j.update(kind="ball")), "joints"),
+    "everywhere alike: axis negated": (alike(lambda j: j.update(axis=[-a for a in j["axis"]])), "joints"),
+    "everywhere alike: value halved": (alike(lambda j: j.update(value=j["value"] / 2)), "joints"),
+    "everywhere alike: hinge 4 cm beside": (alike(lambda j: j["point"].__setitem__(0, j["point"][0] + 0.04)), "joints"),
+    "everywhere alike: hinge 4 cm before": (alike(lambda j: j["point"].__setitem__(2, j["point"][2] + 0.04)), "joints"),
+    "everywhere alike: limit x 1.4": (alike(lambda j: j.update(upper=j["upper"] * 1.4)), "joints"),
+    "everywhere alike: limit - 0.3 rad": (alike(lambda j: j.update(upper=j["upper"] - 0.3)), "joints"),
+    "everywhere alike: lower limit - 0.3 rad": (alike(lambda j: j.update(lower=-0.3)), "joints"),
+    "everywhere alike: mass x 10": (alike(lambda j: j.update(mass_kg=j["mass_kg"] * 10)), "joints"),
+    "everywhere alike: a slide": (alike(lambda j: j.update(kind="prismatic")), "joints"),
+    "mass of an unseen joint": (document("house.json", lambda h: next(j for i in h["items"] for j in i.get("joints", []) if j["value"] == 0).update(mass_kg=50.0)), "joints"),
     "a part of house.glb renamed": (moving(lambda p: p["extras"].update(part="lid 1")), "joints"),
     "a part of house.glb marked static": (moving(lambda p: p.pop("extras")), "joints"),
 }  # fmt: skip
