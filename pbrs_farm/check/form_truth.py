@@ -106,7 +106,8 @@ def _areas(n: int, of: int) -> F64:
     edges = np.arange(n + 1) * of / n
     low, high = edges[:-1, None], edges[1:, None]
     pixel = np.arange(of)
-    return np.clip(np.minimum(high, pixel + 1) - np.maximum(low, pixel), 0, None) / (high - low)
+    shares = np.clip(np.minimum(high, pixel + 1) - np.maximum(low, pixel), 0, None)
+    return np.asarray(shares / (high - low))
 
 
 def mask_from_runs(runs: dict[str, Any]) -> Bools:

@@ -247,7 +247,8 @@ def _steps_of_pairs(picture: NDArray[Any], axis: int, first: int) -> F64:
     """Steps from the first row (or column) of each pair to its second; pairs begin at `first`."""
     rows = np.moveaxis(picture, axis, 0)[first:]
     rows = rows[: len(rows) // 2 * 2]
-    return np.clip((rows[1::2] - rows[::2]).astype(np.float64), -_MOST_STEP, _MOST_STEP)
+    steps = (rows[1::2] - rows[::2]).astype(np.float64)
+    return np.asarray(np.clip(steps, -_MOST_STEP, _MOST_STEP))
 
 
 def _bright_pixels(instance: NDArray[Any], house: StoredHouse) -> Bools:

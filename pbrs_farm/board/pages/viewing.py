@@ -230,7 +230,7 @@ def _camera_expression(facts: dict[str, Any]) -> str:
     """Python that makes the view's camera; "" for other lenses than a pin-hole and for damaged facts."""
     if "lens" in facts:
         return ""
-    size = facts.get("width_px"), facts.get("height_px")
+    size: Any = facts.get("width_px"), facts.get("height_px")
     try:
         pose, k = (np.asarray(facts.get(x), np.float64) for x in ("world_from_camera_opencv", "K"))
         Camera.from_opencv(pose, k, size=size)

@@ -132,7 +132,7 @@ def companions_of_habitat(given: GivenFile, files: SourceFiles) -> str:
             urdf = dataset.urdf(template)
             if urdf is not None:
                 names |= {urdf, *files_of_robot(dataset.robot(urdf), dataset.folder, urdf, files)}
-                names |= {found[1] for found in [dataset.template(template, "ao")] if found}
+                names |= {a[1] for a in [dataset.template(template, "ao")] if a}
         for pattern in ("*.semantic_config.json", "*objects.csv", "*.lighting_config.json"):
             names |= set(dataset.named(pattern))
     except (BadHouse, OSError, AttributeError, TypeError):

@@ -152,7 +152,7 @@ def _remove_broken_relations(model: Any) -> None:
     """Remove relations that lack one of their sides, such as an opening without a wall."""
     from ifcopenshell.ifcopenshell_wrapper import schema_by_name
 
-    schema = schema_by_name(model.schema_identifier)
+    schema: Any = schema_by_name(model.schema_identifier)
     for row in model.by_type("IfcRelationship"):
         attributes = schema.declaration_by_name(row.is_a()).all_attributes()
         if any(

@@ -187,13 +187,13 @@ def _model(model: Element, name: str, world_from_model: F64, file: str) -> SdfMo
     links, lights, n_unread = [], [], 0
     for link in order:
         place = f"model {name[:40]}: link {link[:40]}"
-        row, parent, joint = joint_of.get(link), None, None
+        joint_row, parent, joint = joint_of.get(link), None, None
         frame_of[link] = np.eye(4)
-        if row is not None:
-            parent = (row.findtext("parent") or "").strip()
-            frame_of[link] = frames.of(str(row.get("name")))
+        if joint_row is not None:
+            parent = (joint_row.findtext("parent") or "").strip()
+            frame_of[link] = frames.of(str(joint_row.get("name")))
             parent_from_joint = np.linalg.inv(frame_of[parent]) @ frame_of[link]
-            joint = _joint(row, np.asarray(parent_from_joint), frame_of[link], file)
+            joint = _joint(joint_row, np.asarray(parent_from_joint), frame_of[link], file)
         link_from_own = np.linalg.inv(frame_of[link]) @ frames.of(link)
         visuals = []
         for visual in rows[link].findall("visual"):
