@@ -70,7 +70,10 @@ def _holes(
     ceiling_y = max(r.ceiling_y for r in rooms)
     # Merge the rooms and walls of this level.
     feet = [w.footprint for w in walls if w.bottom_y < ceiling_y - 0.1 and w.high_y > floor_y + 0.1]
-    areas = [plan.polygon_of_room(r.polygon) for r in rooms]
+    # A stairwell that the file has as a room of two storeys is none of this level's holes.
+    middle_y = (floor_y + ceiling_y) / 2
+    through = [r for r in house.rooms if r.floor_y < middle_y < r.ceiling_y]
+    areas = [plan.polygon_of_room(r.polygon) for r in {r.id: r for r in rooms + through}.values()]
     whole = plan.closed(plan.union([*areas, *feet]), 2 * GAP_M)
     stairs = [
         # Boxes of stairs that begin or end here.

@@ -303,6 +303,31 @@ def test_a_room_reaches_down_to_its_slab_where_no_finish_is_drawn(
     assert (report.leaks.n_sky, report.leaks.n_rays > 100_000) == (0, True)
 
 
+def test_a_stairwell_that_is_a_room_of_two_storeys_is_closed(tmp_path: Path) -> None:
+    building = IfcHouse()
+    building.storey("EG", 0.0)
+    corners, top = [(0, 0), (6, 0), (6, 4), (0, 4)], 5.45
+    for k, corner in enumerate(corners):
+        building.wall(f"Wall {k}", corner, corners[(k + 1) % 4], 0.0, top)
+    ground = building.box_solid((0, 0, -0.25), (6, 4, 0))
+    building.product("IfcSlab", "Ground", [ground], PredefinedType="FLOOR")
+    building.space("Hall", [(0.2, 0.2), (4, 0.2), (4, 3.8), (0.2, 3.8)], 0.0, 2.6)
+    stairs = [(4, 0.2), (5.8, 0.2), (5.8, 3.8), (4, 3.8)]
+    building.space("Stair", stairs, 0.0, top)
+    flight = building.box_solid((4.2, 0.5, 0), (5.0, 3.5, 2.85))
+    building.product("IfcStair", "Stair", [flight])
+    building.storey("OG", 2.85)
+    floor = building.box_solid((0, 0, 2.6), (4, 4, 2.85))
+    building.product("IfcSlab", "Upper", [floor], PredefinedType="FLOOR")
+    building.space("Landing", [(0.2, 0.2), (4, 0.2), (4, 3.8), (0.2, 3.8)], 2.85, 2.6)
+    roof = building.box_solid((-0.3, -0.3, 0), (6.3, 4.3, 0.3))
+    building.product("IfcSlab", "Roof", [roof], (0, 0, top), PredefinedType="ROOF")
+    house = read_house(resolve(str(building.save(tmp_path / "stair.ifc"))), ReadFields())
+    _repaired, report = repair(house, RepairFields(), occluder_from=EmbreeOccluder)
+    assert [room.reason for room in report.rooms if room.reason] == []
+    assert (report.leaks.closed_share, report.leaks.n_sky) == (1, 0)
+
+
 def test_a_repaired_building_leaks_no_ray_and_keeps_walls_and_openings(tmp_path: Path) -> None:
     house = read(two_rooms(), tmp_path)
     repaired, report = repair(house, RepairFields(), occluder_from=EmbreeOccluder)
