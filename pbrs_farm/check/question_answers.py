@@ -27,6 +27,12 @@ _ROUNDING_M: Final = 0.05  # of an answer in metres with one decimal
 _SLACK_M: Final = 0.006  # of a distance between points of that spacing
 _NOTICED: Final = 1e-4  # share of a picture's pixels
 _CONE_DEG: Final = 10.0  # least angle of a direction from the border to the next
+# Class -> words of names that are nouns of their own.
+_OWN_WORDS: Final = {
+    "bag": "suitcase|backpack", "bed": "crib|duvet|mattress", "box": "basket|crate", "cabinet": "wardrobe",
+    "chair": "armchair|bench|stool|ottoman|pouf", "curtain": "curtains", "lamp": "candle|candlestick",
+    "television": "monitor", "towel": "towels",
+}  # fmt: skip
 
 
 class _Home:
@@ -142,9 +148,9 @@ class _Scene:
 
 def _word(row: dict[str, Any]) -> str:
     name = str(row["class"])
-    seat = re.search(r"\b(bench|stool|ottoman|pouf)\b", str(row["name"]).lower())
-    if name == "chair" and seat:
-        return seat[0]
+    own = _OWN_WORDS.get(name) and re.search(rf"\b({_OWN_WORDS[name]})\b", str(row["name"]).lower())
+    if own:
+        return own[0]
     return re.sub(r"[\d ]+$", "", str(row["name"])).lower() if name.startswith("other") else name
 
 
@@ -301,33 +307,37 @@ def wrong_references(root: Path, export: Path) -> list[str]:
         for sentence in ref["sentences"]:
             phrase = sentence["sent"]
             is_whole = sentence["raw"] == phrase and sentence["tokens"] == phrase.split()
-            fault = _fault_of_phrase(scene, row["instance_id"], phrase)
+            fault = fault_of_phrase(scene, row["instance_id"], phrase)
             if fault or not is_whole:
                 wrong.append(f"{ref['ref_id']}: {fault or 'has other tokens'}: {phrase}")
     return wrong
 
 
 _ORDER: Final = ("leftmost", "second", "third", "fourth", "fifth")
+_COLOURS: Final = (
+    "black", "grey", "white", "red", "brown", "orange", "yellow", "beige", "green", "blue", "purple", "pink",
+)  # fmt: skip
 
 
-def _fault_of_phrase(scene: _Scene, instance: int, phrase: str) -> str:
+def fault_of_phrase(scene: Any, instance: int, phrase: str) -> str:
+    """Why a phrase does not name an instance; "" if it does. scene: rows, namesakes and depths of instances."""
     row, names = scene.rows[instance], scene.namesakes(instance)
     noun, best = phrase.removeprefix("the ").removesuffix(" from the left"), instance
-    if _fits(row, noun):
-        return "" if names == [instance] else "fits several items"
     order = sorted(names, key=lambda k: int(sum(scene.rows[k]["box2d"][::2])))
     first, _space, rest = noun.partition(" ")
     before, _on, side = noun.rpartition(" on the ")
     if first in (*_ORDER, "rightmost"):
         noun, best = rest, order[-1 if first == "rightmost" else _ORDER.index(first)]
-    elif side in ("left", "right"):
+    elif side in ("left", "right") and before:
         noun, best = before, order[-1 if side == "right" else 0]
     elif noun.endswith(" nearest to the camera"):
         noun, best = noun.removesuffix(" nearest to the camera"), min(names, key=scene.depth)
     elif noun.endswith(" farthest from the camera"):
         noun, best = noun.removesuffix(" farthest from the camera"), max(names, key=scene.depth)
-    else:
-        noun = before or rest  # on a support, or of a colour
+    elif before or first in _COLOURS:
+        noun = before or rest  # neither supports nor colours are judged
+    elif names != [instance]:
+        return "fits several items"
     if not noun or not _fits(row, noun):
         return "is of another noun"
     return "" if best == instance else f"fits instance {best}"

@@ -6,6 +6,7 @@ import json
 import shutil
 from fnmatch import fnmatch
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import pytest
@@ -14,6 +15,7 @@ from pbrs_farm import check
 from pbrs_farm.check import verify
 from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.fields import FieldRow, fields_of, fields_of_set, row_and_names
+from pbrs_farm.check.question_answers import fault_of_phrase
 from pbrs_farm.check.stored_set import PACKED, stored_set
 from pbrs_farm.check.verify import check_form, check_set
 from pbrs_farm.cli import main
@@ -159,3 +161,21 @@ def test_a_damaged_set_s_file_is_named(
 def test_the_certificate_of_a_root_names_that_of_sets(finished_set: Path) -> None:
     certificate = verify(finished_set / "parts/panoramas", sample=10)
     assert any("`pbrs-farm verify SET`" in line for line in certificate.not_looked_at)
+
+
+@pytest.mark.parametrize(
+    ("phrase", "fault"),
+    [
+        ("the armchair on the left", ""), ("the armchair on the right", "fits instance 2"),
+        ("the leftmost armchair", ""), ("the armchair nearest to the camera", "fits instance 2"),
+        ("the armchair farthest from the camera", ""), ("the blue armchair", ""),
+        ("the armchair", "fits several items"), ("the sofa on the left", "is of another noun"),
+    ],
+)  # fmt: skip
+def test_a_phrase_is_judged_by_its_words(phrase: str, fault: str) -> None:
+    rows = {
+        k: {"class": "chair", "name": "Armchair", "kind": "object", "box2d": [x, 0, x + 9, 9]}
+        for k, x in ((1, 0), (2, 40))
+    }
+    scene = SimpleNamespace(rows=rows, namesakes=lambda _k: [1, 2], depth=lambda k: 9000 - k)
+    assert fault_of_phrase(scene, 1, phrase) == fault
