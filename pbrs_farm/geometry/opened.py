@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator
 from dataclasses import dataclass, replace
 from typing import Final
 
@@ -82,30 +82,47 @@ def free_value(scene: SceneTriangles, index: int, part: str, target: float) -> t
     alone by less than about a centimetre are ignored too: neighbouring fronts, a rug below a door.
     Closing is never blocked.
     """
-    item = scene.items[index]
-    joint = joint_of(item, part)
-    if target <= joint.value:
-        return target, ""
-    corners = part_triangles(item, part)
-    if not len(corners):
-        return target, ""
+    start = joint_of(scene.items[index], part).value
     best, stopped_by = target, ""
-    track = _Track.of(joint, surface_points(corners, _SPACING_M))
-    low, high = _bounds_of_way(joint, corners, target)
-    for name, faces in _near(scene, index, part, low, high):
-        reach = joint.value + track.way_to(faces, np.array([low, high]))
-        if reach < best:
-            best, stopped_by = max(reach, joint.value), name
+    for k, value in stops(scene, index, part, target).items():
+        if value < best:
+            best, stopped_by = max(value, start), scene.items[k].id
     return best, stopped_by
 
 
+def stops(
+    scene: SceneTriangles,
+    index: int,
+    part: str,
+    target: float,
+    among: Collection[int] | None = None,
+) -> dict[int, float]:
+    """Joint value at which each item alone stops a part of scene.items[index], by the rules of free_value.
+
+    among: indices of the items to measure, None = all. Items that the part does not meet on its way to
+    target are left out, or have a value beyond it.
+    """
+    joint = joint_of(scene.items[index], part)
+    if target <= joint.value:
+        return {}
+    corners = part_triangles(scene.items[index], part)
+    if not len(corners):
+        return {}
+    low, high = _bounds_of_way(joint, corners, target)
+    near = dict(_near(scene, index, part, low, high, among))
+    if not near:
+        return {}
+    track, box = _Track.of(joint, surface_points(corners, _SPACING_M)), np.array([low, high])
+    return {k: joint.value + track.way_to(faces, box) for k, faces in near.items()}
+
+
 def _near(
-    scene: SceneTriangles, index: int, part: str, low: F64, high: F64
-) -> Iterator[tuple[str, F64]]:
+    scene: SceneTriangles, index: int, part: str, low: F64, high: F64, among: Collection[int] | None
+) -> Iterator[tuple[int, F64]]:
     """The items whose faces meet a box, with those faces; of the own item other open parts."""
     for k in scene.items_in(low, high):
         item = scene.items[k]
-        if item.nyu40 == FLOOR_MAT:
+        if item.nyu40 == FLOOR_MAT or (among is not None and k not in among):
             continue
         if k == index:
             open_parts = [j.part for j in item.joints if j.part != part and j.value != 0]
@@ -117,7 +134,7 @@ def _near(
         least, most = triangle_bounds(corners)
         meets = ((most >= low) & (least <= high)).all(1)
         if meets.any():
-            yield item.id, corners[meets]
+            yield k, corners[meets]
 
 
 def _bounds_of_way(joint: Joint, corners: F64, target: float) -> tuple[F64, F64]:
@@ -158,7 +175,8 @@ class _Track:
         low = plane.min(0) - 2 * _CELL_M
         cell = np.floor((plane - low) / _CELL_M).astype(np.int64)
         front = np.full(tuple(cell.max(0) + 3), -np.inf)
-        np.maximum.at(front, (cell[:, 0], cell[:, 1]), way)
+        # One index: numpy's fast way.
+        np.maximum.at(front.reshape(-1), cell[:, 0] * front.shape[1] + cell[:, 1], way)
         # Imported here: every process of a run imports this module, few call this function.
         from scipy import ndimage
 

@@ -16,6 +16,7 @@ from pbrs_farm.core.house import Item
 from pbrs_farm.core.mesh import edges_are_paired, points_bounds, signed_volume
 from pbrs_farm.dress.mutable_house import ADDED_TAG, MutableHouse
 from pbrs_farm.geometry.surface_points import item_triangles
+from pbrs_farm.geometry.swept import Swept, swept_by_item
 
 Faces = NDArray[np.int64]
 
@@ -49,6 +50,9 @@ class Body:
     was: Item | None  # the replaced item of the source; None for added items
     piece: Piece | None  # it was made from
     _shells: list[Shell] | None = field(default=None, repr=False)
+    _swept: list[Swept] | None = field(default=None, repr=False)
+    stops: dict[str, dict[int, float]] = field(default_factory=dict, repr=False)
+    """Part -> id() of another item -> joint value at which it stops the part: cache of gates/fronts.py."""
 
     @property
     def group(self) -> str:
@@ -64,6 +68,13 @@ class Body:
         if self._shells is None:
             self._shells = shells_of(self.corners)
         return self._shells
+
+    @property
+    def swept(self) -> list[Swept]:
+        """The space that each of its doors and drawers sweeps; computed at the first call."""
+        if self._swept is None:
+            self._swept = swept_by_item(self.item)
+        return self._swept
 
 
 def bodies_of(

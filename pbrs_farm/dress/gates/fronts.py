@@ -8,15 +8,15 @@ from __future__ import annotations
 from collections.abc import Sequence
 from typing import Final
 
+import numpy as np
+
 from pbrs_farm.core.classes import CHAIR
-from pbrs_farm.core.house import Item, ItemKind
 from pbrs_farm.core.joints import Joint
-from pbrs_farm.dress.gates.bodies import Body
+from pbrs_farm.dress.gates.bodies import Body, boxes_of
 from pbrs_farm.dress.gates.ways import Blocked
 from pbrs_farm.dress.space import HouseSpace
-from pbrs_farm.geometry.opened import free_value
+from pbrs_farm.geometry.opened import stops
 from pbrs_farm.geometry.scene_triangles import SceneTriangles
-from pbrs_farm.geometry.swept import swept_by_item
 
 LEAST_OPEN: Final = 0.9  # share of its way that a front must have free
 
@@ -30,30 +30,22 @@ def blocked_fronts(_space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, lis
     """
     n, blocked = 0, []
     scene = SceneTriangles([b.item for b in bodies])
-    new = [k for k, b in enumerate(bodies) if b.is_new and b.item.nyu40 != CHAIR]
+    lows, highs = boxes_of(bodies)
+    solid = np.array([b.item.nyu40 != CHAIR for b in bodies], bool)
+    solid_new = solid & np.array([b.is_new for b in bodies], bool)
     for k, body in enumerate(bodies):
-        if body.item.kind is not ItemKind.OBJECT:
-            continue
-        is_added = body.is_new and body.was is None
+        others = solid if body.is_new and body.was is None else solid_new
         joints = {joint.part: joint for joint in body.item.joints}
-        for swept in swept_by_item(body.item):
+        for swept in body.swept:
             x0, z0, x1, z1 = swept.area.bounds
-            near = [
-                i
-                for i in (range(len(bodies)) if is_added else new)
-                if i != k
-                and bodies[i].item.nyu40 != CHAIR
-                and bodies[i].low[0] < x1
-                and bodies[i].high[0] > x0
-                and bodies[i].low[1] < swept.high_y
-                and bodies[i].high[1] > swept.low_y
-                and bodies[i].low[2] < z1
-                and bodies[i].high[2] > z0
-            ]
+            low, high = (x0, swept.low_y, z0), (x1, swept.high_y, z1)
+            meets = others & ((lows < high) & (highs > low)).all(1)
+            meets[k] = False
+            near = np.flatnonzero(meets).tolist()
             if not near:
                 continue
             n += 1
-            stopped_by = _stopped_by(scene, k, near, joints[swept.part])
+            stopped_by = _stopped_by(scene, bodies, k, near, joints[swept.part])
             if stopped_by is not None:
                 blocked.append(Blocked(body.item.id, bodies[_goes(bodies, k, stopped_by)].index))
     return n, blocked
@@ -66,12 +58,18 @@ def _goes(bodies: Sequence[Body], own: int, other: int) -> int:
     return max(own, other) if bodies[own].is_new and bodies[own].was is None else other
 
 
-def _stopped_by(scene: SceneTriangles, seed: int, near: Sequence[int], joint: Joint) -> int | None:
+def _stopped_by(
+    scene: SceneTriangles, bodies: Sequence[Body], own: int, near: Sequence[int], joint: Joint
+) -> int | None:
     """Which of some items stops a part before nine tenths of its way; None: it opens."""
-    items: list[Item] = [scene.items[seed], *(scene.items[i] for i in near)]
-    some = SceneTriangles(items)
     target = joint.lower + LEAST_OPEN * (joint.upper - joint.lower)
-    value, by = free_value(some, 0, joint.part, target)
-    if value >= target - 1e-9:
-        return None
-    return next((i for i in near if scene.items[i].id == by), None)
+    stops_by = bodies[own].stops.setdefault(joint.part, {})
+    # Other open parts of the item itself stop the part, too.
+    keys = {k: id(bodies[k].item) for k in (own, *near)}
+    missing = [k for k, key in keys.items() if key not in stops_by]
+    if missing:
+        values = stops(scene, own, joint.part, target, missing)
+        stops_by |= {keys[k]: values.get(k, np.inf) for k in missing}
+    first = min(keys, key=lambda k: stops_by[keys[k]])
+    is_free = max(stops_by[keys[first]], joint.value) >= target - 1e-9
+    return None if is_free or first == own else first

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 import numpy as np
 import pytest
@@ -11,9 +12,10 @@ from pbrs_farm.core.catalogue import Piece, Place, Shape
 from pbrs_farm.core.classes import CHAIR
 from pbrs_farm.core.house import House, Item, ItemKind, Material
 from pbrs_farm.core.joints import Joint, JointKind
-from pbrs_farm.dress.gates import keep_gates
+from pbrs_farm.dress.gates import fronts, keep_gates
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.report import Gate
+from pbrs_farm.geometry.opened import stops
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.dress.furniture import house, solid
@@ -227,3 +229,21 @@ def test_a_new_chest_that_cannot_open_goes_itself() -> None:
     assert "chest" not in names(mutable)
     assert mutable.refused["test: stood before a front"] == 1
     assert gate.n_left == 0
+
+
+def test_a_front_is_measured_against_each_item_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    mutable = MutableHouse(house(drawer_chest(1.0, 1.0)), 1)
+    for name, z in (("thing", 1.41), ("beyond", 1.40)):
+        with_box(mutable, name, [1.1, 0.0, z], [1.5, 0.5, z + 0.4], piece("box"))
+    asked: list[int] = []
+
+    def counted(*arguments: Any) -> dict[int, float]:
+        asked.extend(arguments[-1])
+        return stops(*arguments)
+
+    monkeypatch.setattr(fronts, "stops", counted)
+    keep_gates(mutable, mutable.used, ("fronts",))
+    n_first = len(asked)
+    with_box(mutable, "third", [1.1, 0.0, 1.405], [1.5, 0.5, 1.8], piece("box"))
+    keep_gates(mutable, mutable.used, ("fronts",))
+    assert (n_first, len(asked)) == (3, 4)  # the chest itself and two items, then the third
