@@ -115,7 +115,7 @@ class Shelf:
         seat, top = self.catalogue.shape(chair), self.catalogue.shape(table)
         if seat is None or top is None:
             return most_m
-        return min(way_under_m(seat, top, at, turns), most_m)
+        return way_under_m(seat, top, at, turns, most_m)
 
     def _top(self, piece: Piece) -> float:
         shape = self.catalogue.shape(piece)

@@ -32,18 +32,18 @@ class _Depths(NamedTuple):
     inner: Bools  # cells that count: a chair's rim may graze
 
 
-def way_under_m(chair: Shape, table: Shape, at: float, turns: int) -> float:
-    """Metres that a chair's front goes beyond a table's edge; inf where nothing stops it.
+def way_under_m(chair: Shape, table: Shape, at: float, turns: int, most_m: float) -> float:
+    """Metres that a chair's front goes beyond a table's edge, at most most_m.
 
     at: metres of the chair's middle from that of the edge, along the chair's width. turns: quarter turns
     of the chair to the left, against the table's.
     """
-    return _way_m(chair, table, round(at / _CELL_M), turns % 4)
+    return min(_way_m(chair, table, round(at / _CELL_M), turns % 4, most_m), most_m)
 
 
 @lru_cache(maxsize=65536)
-def _way_m(chair: Shape, table: Shape, at: int, turns: int) -> float:
-    front, near = _front(chair), _near(table)[turns]
+def _way_m(chair: Shape, table: Shape, at: int, turns: int, most_m: float) -> float:
+    front, near = _front(chair), _near(table, turns, most_m)
     # Cells that both have, counted from the chair's middle.
     begins = np.array(near.first) - [at, 0]
     low = np.maximum(front.first, begins)
@@ -67,19 +67,25 @@ def _front(chair: Shape) -> _Depths:
     return _Depths(first, depths, ndimage.binary_erosion(covered) & np.isfinite(depths))
 
 
-@lru_cache(maxsize=256)
-def _near(table: Shape) -> tuple[_Depths, ...]:
-    """Where a table begins behind its edge, as a chair before each of its sides sees it, by turns."""
+@lru_cache(maxsize=512)
+def _near(table: Shape, turns: int, most_m: float) -> _Depths:
+    """Where a table begins behind one of its edges, as a chair before that side sees it.
+
+    Only cells where it begins within most_m, and few others.
+    """
     corners = corners_of_surfaces(table.surfaces)
-    points = surface_points(corners, _SPACING_M)
     box = np.stack([corners.min((0, 1)), corners.max((0, 1))])
-    sides = []
-    for _ in range(4):
-        first, depths = _greatest(points, box[:, 2].min() - points[:, 2])
-        sides.append(_Depths(first, -depths, np.isfinite(depths)))
+    # Take the points near the edge alone.
+    end, axis = ((0, 2), (1, 0), (1, 2), (0, 0))[turns]
+    slab = box + np.array([[-1.0], [1.0]])
+    reach = most_m + _APART_M + _CELL_M
+    slab[1 - end, axis] = box[end, axis] + (-reach if end else reach)
+    points = surface_points(corners, _SPACING_M, slab)
+    for _ in range(turns):
         # A quarter turn, without a rounding: z takes the place of x, -x that of z.
         points, box = (rows[:, [2, 1, 0]] * _QUARTER for rows in (points, box))
-    return tuple(sides)
+    first, depths = _greatest(points, box[:, 2].min() - points[:, 2])
+    return _Depths(first, -depths, np.isfinite(depths))
 
 
 def _greatest(points: F64, values: F64) -> tuple[tuple[int, int], F64]:
@@ -87,5 +93,6 @@ def _greatest(points: F64, values: F64) -> tuple[tuple[int, int], F64]:
     cells = np.floor(points[:, :2] / _CELL_M).astype(np.int64)
     first = cells.min(0) - 2
     greatest = np.full(tuple(cells.max(0) - first + 3), -np.inf)
-    np.maximum.at(greatest, tuple((cells - first).T), values)
+    # One index: numpy's fast way.
+    np.maximum.at(greatest.reshape(-1), (cells - first) @ [greatest.shape[1], 1], values)
     return (int(first[0]), int(first[1])), greatest

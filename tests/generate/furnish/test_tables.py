@@ -9,6 +9,7 @@ from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
 from pbrs_farm.core.house import Material
 from pbrs_farm.generate.furnish.living_rooms import dining
 from pbrs_farm.generate.furnish.pieces import Shelf
+from pbrs_farm.generate.furnish.under_tables import way_under_m
 from pbrs_farm.geometry.solids import box
 
 SEAT_M, BACK_M = 0.45, 0.04
@@ -57,3 +58,12 @@ def test_a_chair_goes_as_far_under_a_table_as_its_arms_pass(
         edge = table.rect[3] if chair.v > table.v else table.rect[1]
         inner = chair.rect[1] if chair.v > table.v else chair.rect[3]
         assert abs(edge - inner) == pytest.approx(under, abs=0.003)
+
+
+@pytest.mark.parametrize(("turns", "free"), [(0, 0.15), (1, 0.25), (2, 0.55), (3, 0.35)])
+def test_a_chair_stops_at_what_a_table_has_near_that_side(turns: int, free: float) -> None:
+    # A top above the chair, and a block below it at other distances from each edge.
+    top, block = ((-1.0, 0.7, -0.5), (1.0, 0.75, 0.5)), ((-0.65, 0.0, -0.35), (0.75, 0.7, -0.05))
+    table, chair = shape_of(top, block), shape_of(((-0.2, 0.0, -0.2), (0.2, 0.5, 0.2)))
+    ways = [way_under_m(chair, table, 0.0, turns, most) for most in (0.05, free + 0.02, 9.0)]
+    assert ways == [0.05, ways[2], pytest.approx(free - 0.004, abs=0.005)]
