@@ -66,18 +66,18 @@ class Neighbours:
         with the old item's number: touching items share some cubes.
         """
         low, high = item.bounds
-        cubes = _cubes(self.triangles(item))
         around = np.stack([low - CUBE_M, high + CUBE_M])
-        count = 0
+        others = []
         for k in self.near(low, high):
             if k not in without:
                 corners = self.triangles(self.items[k])
                 least, most = triangle_bounds(corners)
                 meets = ((most >= low) & (least <= high)).all(1)
-                count += len(
-                    np.intersect1d(cubes, _cubes(corners[meets], around), assume_unique=True)
-                )
-        return count
+                others.append(_cubes(corners[meets], around))
+        if not any(map(len, others)):
+            return 0
+        cubes = _cubes(self.triangles(item))
+        return sum(len(np.intersect1d(cubes, c, assume_unique=True)) for c in others)
 
 
 def _cubes(corners: F64, box: F64 | None = None) -> Cubes:

@@ -278,7 +278,8 @@ def _fits_between_neighbours(around: Neighbours, members: list[_Member], new: li
     # The new ones may reach into their neighbours no farther than the old ones did.
     set_indices = {m.index for m in members} | {k for m in members for k in m.on}
     return all(
-        around.n_shared(item, set_indices) <= around.n_shared(m.item, set_indices) + FREE_CUBES
+        (n := around.n_shared(item, set_indices)) <= FREE_CUBES
+        or n <= around.n_shared(m.item, set_indices) + FREE_CUBES
         for m, item in zip(members, new, strict=True)
     )
 
