@@ -89,10 +89,11 @@ def _stamp_oval(
 ) -> None:
     """An oval at (y, x) of the repeat, half axes in metres, hollow up to that share of them."""
     rows, columns = field.shape
-    dy = (np.arange(rows) / rows - y + 0.5) % 1.0 - 0.5
-    dx = (np.arange(columns) / columns - x + 0.5) % 1.0 - 0.5
-    r = np.hypot(dy[:, None] * SIZE_M[1] / high_m, dx[None] * SIZE_M[0] / wide_m)
-    np.maximum(field, ((r < 1) & (r >= hollow)).astype(np.float32), out=field)
+    dy = ((np.arange(rows) / rows - y + 0.5) % 1.0 - 0.5) * SIZE_M[1] / high_m
+    dx = ((np.arange(columns) / columns - x + 0.5) % 1.0 - 0.5) * SIZE_M[0] / wide_m
+    near = np.ix_(np.abs(dy) < 1, np.abs(dx) < 1)
+    r = np.hypot(dy[near[0]], dx[near[1]])
+    field[near] = np.maximum(field[near], ((r < 1) & (r >= hollow)).astype(np.float32))
 
 
 def _smudges(house: MutableHouse) -> Texture:
