@@ -84,7 +84,7 @@ def _models(folder: RootFolder, name: str, notes: Notes) -> list[SdfModel]:
         raise BadHouse(name, "", "no such file")
     if b"<sdf" in data:
         return list(models_of_sdf(folder, name, notes))
-    robot = robot_from_urdf(data, name)
+    robot = robot_from_urdf(data, name, notes)
     return [SdfModel("", np.eye(4), robot, (), posixpath.dirname(name))]
 
 

@@ -34,7 +34,8 @@ from pbrs_farm.read.robot.urdf import (
 )
 
 _MODEL: Final = "__model__"
-_MOST_MODELS: Final = 20_000
+_PLACED: Final = ("model", "include")
+_MOST_MODELS: Final = 10_000  # models and includes
 _MOST_DEPTH: Final = 20  # of includes, and of frames relative to others
 # of Gazebo's own library, which worlds do not bring along
 _GROUND: Final = (
@@ -72,46 +73,72 @@ class SdfModel:
 def models_of_sdf(folder: RootFolder, file: str, notes: Notes) -> Iterator[SdfModel]:
     """The models of a document with those it includes; a damaged or missing one is a note.
 
-    Lights of the world are a model without links. Raises BadHouse if the document is damaged.
+    Lights of the world are a model without links. Raises BadHouse if the document is damaged, or has more
+    than 10,000 models and includes.
     """
     root = parsed_xml(folder.read(file, max_bytes=MAX_BYTES) or b"", file, "sdf")
-    n_models = 0
+    walk = _Walk(folder, notes)
     for world in [*root.findall("world"), root]:
-        for state in world.findall("state/model"):
-            for row in world:
-                if _name_of(row) == state.get("name") and row.tag in ("model", "include"):
-                    _replace_pose(row, state.find("pose"))
-        for model in _models_in(world, folder, file, notes, np.eye(4), 0):
-            n_models += 1
-            if n_models > _MOST_MODELS:
-                raise BadHouse(file, "model", f"more than {_MOST_MODELS} models")
-            yield model
+        states = {str(row.get("name")): row for row in world.findall("state/model")}
+        for row in world:
+            if row.tag in _PLACED and _name_of(row) in states:
+                _replace_pose(row, states[_name_of(row)].find("pose"))
+        yield from walk.models_in(world, file, np.eye(4), 0)
         lights = tuple(_light(row, "", file) for row in world.findall("light") if _shines(row))
         if lights:
             parent = posixpath.dirname(file)
             yield SdfModel("", np.eye(4), Robot(()), lights, parent)
+    if walk.n_rows > _MOST_MODELS:
+        raise BadHouse(file, "model", f"more than {_MOST_MODELS} models and includes")
 
 
-def _models_in(
-    parent: Element, folder: RootFolder, file: str, notes: Notes, frame: F64, depth: int
-) -> Iterator[SdfModel]:
-    """The models and includes directly below an element; frame: (4, 4) the world from it."""
-    for row in parent:
-        if row.tag not in ("model", "include"):
-            continue
-        name = _name_of(row)
-        place = f"{row.tag} {name[:60]}"
-        try:
-            if depth > _MOST_DEPTH:
-                raise BadHouse(file, place, f"is nested more than {_MOST_DEPTH} deep")
-            if row.tag == "include":
-                yield from _included(row, folder, file, notes, frame, depth)
+class _Walk:
+    """Visits models and includes; state: their number so far, beyond whose limit none is visited."""
+
+    def __init__(self, folder: RootFolder, notes: Notes) -> None:
+        self._folder, self._notes = folder, notes
+        self.n_rows = 0
+
+    def models_in(self, parent: Element, file: str, frame: F64, depth: int) -> Iterator[SdfModel]:
+        """The models and includes directly below an element; frame: (4, 4) the world from it."""
+        for row in parent:
+            if row.tag not in _PLACED:
                 continue
-            world_from_model = frame @ _pose(row, file, place)
-            yield _model(row, name, world_from_model, file)
-            yield from _models_in(row, folder, file, notes, world_from_model, depth + 1)
-        except BadHouse as error:
-            notes.add("unreadable-model", place, f"{error.message[:200]}; it is left out")
+            self.n_rows += 1
+            if self.n_rows > _MOST_MODELS:
+                return
+            name = _name_of(row)
+            place = f"{row.tag} {name[:60]}"
+            try:
+                if depth > _MOST_DEPTH:
+                    raise BadHouse(file, place, f"is nested more than {_MOST_DEPTH} deep")
+                if row.tag == "include":
+                    yield from self._included(row, file, frame, depth)
+                    continue
+                world_from_model = frame @ _pose(row, file, place)
+                yield _model(row, name, world_from_model, file)
+                yield from self.models_in(row, file, world_from_model, depth + 1)
+            except BadHouse as error:
+                text = f"{error.message[:200]}; it is left out"
+                self._notes.add("unreadable-model", place, text)
+
+    def _included(self, row: Element, file: str, frame: F64, depth: int) -> Iterator[SdfModel]:
+        uri, parent = (row.findtext("uri") or "").strip(), posixpath.dirname(file)
+        name = model_name(uri, self._folder, parent)
+        if self._folder.has_folder(name) or not name.endswith(".sdf"):
+            name = model_name(f"{uri.rstrip('/')}/model.sdf", self._folder, parent)
+        data = self._folder.read(name, max_bytes=MAX_BYTES)
+        if data is None and uri == "model://ground_plane":
+            data = _GROUND
+        if data is None:
+            if uri != "model://sun":
+                self._notes.add("missing-model", f"include {uri[:80]}", "has no model here")
+            return
+        root, own_name = parsed_xml(data, name, "sdf"), (row.findtext("name") or "").strip()
+        for model in root.findall("model")[:1]:
+            model.set("name", own_name or str(model.get("name")))
+            _replace_pose(model, row.find("pose"))
+        yield from self.models_in(root, name, frame, depth + 1)
 
 
 def _name_of(row: Element) -> str:
@@ -124,27 +151,6 @@ def _replace_pose(row: Element, pose: Element | None) -> None:
         for old in row.findall("pose"):
             row.remove(old)
         row.append(pose)
-
-
-def _included(
-    row: Element, folder: RootFolder, file: str, notes: Notes, frame: F64, depth: int
-) -> Iterator[SdfModel]:
-    uri, parent = (row.findtext("uri") or "").strip(), posixpath.dirname(file)
-    name = model_name(uri, folder, parent)
-    if folder.has_folder(name) or not name.endswith(".sdf"):
-        name = model_name(f"{uri.rstrip('/')}/model.sdf", folder, parent)
-    data = folder.read(name, max_bytes=MAX_BYTES)
-    if data is None and uri == "model://ground_plane":
-        data = _GROUND
-    if data is None:
-        if uri != "model://sun":
-            notes.add("missing-model", f"include {uri[:80]}", "has no model here")
-        return
-    root, own_name = parsed_xml(data, name, "sdf"), (row.findtext("name") or "").strip()
-    for model in root.findall("model")[:1]:
-        model.set("name", own_name or str(model.get("name")))
-        _replace_pose(model, row.find("pose"))
-    yield from _models_in(root, folder, name, notes, frame, depth + 1)
 
 
 class _Frames:

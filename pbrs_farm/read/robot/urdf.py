@@ -15,6 +15,7 @@ from scipy.spatial.transform import Rotation
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.joints import JointKind
+from pbrs_farm.read.common.notes import Notes
 
 MAX_BYTES: Final = 16 * 2**20
 _MOST_LINKS: Final = 20_000
@@ -115,10 +116,11 @@ class Robot:
         return {name: float(v) for name, v in values.items() if name in names}
 
 
-def robot_from_urdf(data: bytes, file: str) -> Robot:
+def robot_from_urdf(data: bytes, file: str, notes: Notes | None = None) -> Robot:
     """The links and joints of a URDF; BadHouse where it is damaged, or its joints make no tree.
 
     Collision shapes and masses are not read, nor the materials of models, which have their own.
+    notes: of a home, of whose links a damaged one is left out with a note, and all below it.
     """
     root = parsed_xml(data, file, "robot")
     colours = {str(row.get("name")): row for row in root.findall("material")}
@@ -126,28 +128,48 @@ def robot_from_urdf(data: bytes, file: str) -> Robot:
     if not rows or len(rows) > _MOST_LINKS:
         raise BadHouse(file, "link", f"has {len(rows)} links; 1 to {_MOST_LINKS} are read")
     hung: dict[str, tuple[str, LinkJoint]] = {}
+    lost: set[str] = set()  # links without a place, or with damaged shapes
     for row in root.findall("joint"):
-        joint = _joint(row, file)
         parent, child = (_named(row, tag, rows, file) for tag in ("parent", "child"))
+        try:
+            joint = _joint(row, file)
+        except BadHouse as error:
+            _leave_out(child, error, lost, notes)
+            continue
         if child in hung:
             raise BadHouse(file, f"joint {joint.name[:60]}", f"{child[:60]} has two parents")
         hung[child] = (parent, joint)
     below: dict[str | None, list[str]] = {}
     for name in rows:
         below.setdefault(hung[name][0] if name in hung else None, []).append(name)
+    n_links = 0
     links, waiting, n_unread = [], list(reversed(below.get(None, []))), 0
     while waiting:
         name = waiting.pop()
-        visuals, n = _visuals(rows[name], colours, file)
-        n_unread += n
+        n_links += 1
+        waiting += reversed(below.get(name, []))
         above = hung.get(name)
         parent_name = None if above is None else above[0]
+        try:
+            visuals, n = _visuals(rows[name], colours, file)
+        except BadHouse as error:
+            _leave_out(name, error, lost, notes)
+        if name in lost or parent_name in lost:
+            lost.add(name)
+            continue
+        n_unread += n
         links.append(Link(name, visuals, parent_name, None if above is None else above[1]))
-        waiting += reversed(below.get(name, []))
-    if len(links) < len(rows):
+    if n_links < len(rows):
         raise BadHouse(file, "joint", "the links form a cycle")
     moving = tuple(joint.name for _, joint in hung.values() if joint.kind is not None)
     return Robot(tuple(links), moving, n_unread)
+
+
+def _leave_out(name: str, error: BadHouse, lost: set[str], notes: Notes | None) -> None:
+    if notes is None:
+        raise error
+    lost.add(name)
+    notes.add("unreadable-model", f"link {name[:60]}", f"{error.message[:200]}; it is left out")
 
 
 def parsed_xml(data: bytes, file: str, tag: str) -> Element:

@@ -99,6 +99,24 @@ def test_a_damaged_or_missing_model_is_left_out_of_its_world(tmp_path: Path, mod
     assert len(home.notes) == 1
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "lost"),
+    [
+        ('<axis xyz="0 0 1"/>', '<axis xyz="0 0 0"/>', {"cabinet_door"}),
+        ('<box size="0.6 0.6 1.8"/>', '<box size="0.6 wide 1.8"/>', {"cabinet", "cabinet_door"}),
+    ],
+)
+def test_a_damaged_link_is_left_out_with_those_below_it(
+    tmp_path: Path, old: str, new: str, lost: set[str]
+) -> None:
+    path = write_urdf(tmp_path)
+    path.write_text(path.read_text().replace(old, new))
+    home = house(path)
+    assert {i.name for i in home.items} == set(BOXES) - lost
+    assert sum(len(i.joints) for i in home.items) == 0
+    assert [n.kind for n in home.notes] == ["unreadable-model"]
+
+
 def test_a_change_of_an_included_model_is_seen(tmp_path: Path) -> None:
     path = write_sdf(tmp_path, is_included=True)
     before = resolve(str(path)).companions
@@ -137,3 +155,11 @@ def test_walls_of_one_model_on_a_plane_are_a_room(tmp_path: Path) -> None:
     assert room.polygon.min(0) == pytest.approx([1, -3], abs=0.01)
     assert room.polygon.max(0) == pytest.approx([5, 0], abs=0.01)
     assert room.floor_y == pytest.approx(0, abs=1e-6)
+
+
+def test_a_world_that_includes_itself_ends(tmp_path: Path) -> None:
+    path = tmp_path / "a.sdf"
+    include = "<include><uri>a.sdf</uri></include>"
+    path.write_text(f"<sdf><world name='w'/>{include * 3}</sdf>")
+    with pytest.raises(BadHouse, match="more than 10000 models and includes"):
+        house(path)
