@@ -35,6 +35,7 @@ from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.core.record import Record
 from pbrs_farm.core.shown_text import did_you_mean, hint_of_choice
 from pbrs_farm.curate.teaching_rules import REASONS
+from pbrs_farm.export.chosen_view import Choice
 from pbrs_farm.export.form import ViewForm, form_names, form_of, options_from
 from pbrs_farm.export.view_options import ViewOptions
 from pbrs_farm.prepare.home_kinds import kind_of_word
@@ -228,19 +229,21 @@ def _check_forms(forms: Sequence[SetForm], parts: Sequence[SetPart], file: str) 
         if not isinstance(kind, ViewForm):
             continue
         for part in parts:
-            text = _misfit(kind, part) if part.name in form.parts else ""
+            text = _misfit(kind, part, form.choice) if part.name in form.parts else ""
             if text:
                 hint = 'parts = ["..."] names other parts'
                 raise BadInput(file, f"form.{form.name}: part {part.name}", text, hint=hint)
 
 
-def _misfit(form: ViewForm, part: SetPart) -> str:
+def _misfit(form: ViewForm, part: SetPart, choice: Choice) -> str:
     """Reason why a form cannot hold the views of a part; "" if it can."""
     lens, layers = part.recipe.lens.model, set(part.want.layers)
     if form.lenses and lens not in form.lenses:
         return f"lens.model {lens}: this format supports {', '.join(form.lenses)}"
     if form.layers and layers.isdisjoint(form.layers):
         return f"{form.name} needs a layer of {', '.join(form.layers)}"
+    if part.want.drop_radiance and (form.reads_radiance or "radiance" in (choice.layers or ())):
+        return "the form reads radiance.exr: omit drop_radiance"
     if form.is_of_frames and source_of(part.recipe.cameras).is_sequence is False:
         return f'{form.name} needs frames of sequences (cameras = "walk")'
     return ""

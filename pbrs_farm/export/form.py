@@ -73,7 +73,8 @@ class ViewForm:
     user-defined classes can replace NYU40's. finish: called once after all splits with the whole
     folder, the names of the splits (() without) and the Choice. convention: None if the form defines no
     pixels, axes or depth. lenses: lens models that it can describe, () for any. layers: a view needs one of
-    them, if any are named. is_of_frames: True if its views are the frames of sequences.
+    them, if any are named. is_of_frames: True if its views are the frames of sequences. reads_radiance: True
+    if it writes less for views without radiance.exr.
     """
 
     of: ClassVar[str] = "views"
@@ -88,6 +89,7 @@ class ViewForm:
     lenses: tuple[str, ...] = ()
     layers: tuple[str, ...] = ()
     is_of_frames: bool = False
+    reads_radiance: bool = False
 
 
 @dataclass(frozen=True, slots=True)

@@ -48,6 +48,7 @@ class RunCost:
     gpu_s: float = 0.0
     cpu_beside_gpu_s: float = 0.0
     n_bytes: float = 0.0
+    n_radiance_bytes: float = 0.0  # of radiance.exr, in n_bytes unless the run drops it
     n_files: float = 0.0
 
     def __add__(self, other: RunCost) -> RunCost:
@@ -91,18 +92,20 @@ def cost_of_run(recipe: Recipe, want: Wanted, n_houses: int) -> RunCost:
     house_s = m["house_cpu_s"] + has_light * m["daylight_cpu_s"]
     beside_s = n_houses * house_s + n_views * (m["view_cpu_s"] + lit)
     per_pixel = (
-        m["label_bytes"]
-        + n_pictures * m["picture_bytes"]
-        + has_light * m["radiance_bytes"]
-        + len(want.layers) * m["layer_bytes"]
+        m["label_bytes"] + n_pictures * m["picture_bytes"] + len(want.layers) * m["layer_bytes"]
     )
-    files = m["view_files"] + n_pictures + has_light + len(want.layers)
+    has_radiance = has_light and not want.drop_radiance
+    radiance = n_views * pixels * 1e6 * has_light * m["radiance_bytes"]
+    files = m["view_files"] + n_pictures + has_radiance + len(want.layers)
     return RunCost(
         n_houses=n_houses,
         n_views=round(n_views),
         cpu_s=beside_s + n_views * samples * m["light_cpu_s"],
         gpu_s=n_views * samples * m["light_gpu_s"],
         cpu_beside_gpu_s=beside_s,
-        n_bytes=n_houses * m["house_bytes"] + n_views * pixels * 1e6 * per_pixel,
+        n_bytes=n_houses * m["house_bytes"]
+        + n_views * pixels * 1e6 * per_pixel
+        + has_radiance * radiance,
+        n_radiance_bytes=radiance,
         n_files=n_houses * m["house_files"] + n_views * files,
     )

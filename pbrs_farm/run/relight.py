@@ -81,6 +81,8 @@ def relit(
     """
     # OUT of OUT/houses/<house>/views/<view>.
     root = view.resolve().parents[3] if len(view.resolve().parents) > 3 else view
+    if not (view / RADIANCE_EXR).is_file():
+        raise BadInput(view, RADIANCE_EXR, "no such file", hint=_NO_LIGHT)
     radiance = radiance_from_exr(read_given(view / RADIANCE_EXR), str(view / RADIANCE_EXR))
     aovs = linear_aovs(radiance)
     clean = denoise_aovs(aovs) if denoise else aovs
@@ -147,6 +149,10 @@ def _is_named(row: Mapping[str, Any], word: str) -> bool:
     return is_it or ("*" in word and (fnmatchcase(item, word) or fnmatchcase(name, word)))
 
 
+_NO_LIGHT: Final = (
+    "the view has no mode of light, or was rendered with --drop-radiance: render it again into a"
+    " new folder without that"
+)
 _VIEW: Final = re.compile(
     r"(?P<root>[^:]+://.+)/(?:houses|objects)/(?P<house>[^/]+)/views/(?P<view>[^/]+)/?"
 )
@@ -179,5 +185,6 @@ def folder_of_view(word: str, settings: StoreSettings, *, needs_light: bool) -> 
             except ObjectMissing:
                 # house.json needs its credit line alone.
                 if key in needed_keys:
-                    raise BadInput(word, key, "not in this store") from None
+                    hint = _NO_LIGHT if key.endswith(RADIANCE_EXR) else ""
+                    raise BadInput(word, key, "not in this store", hint=hint) from None
         yield Path(folder) / keys.view_key(house, view)

@@ -221,6 +221,11 @@ class Wanted(Record):
         "write tracks.npz: surface points tracked through the frames of a walk (docs/motion.md)",
         group="output",
     )
+    drop_radiance: bool = option(
+        False,
+        "remove each finished view's radiance.exr, most of its bytes, which `relight` and --update read",
+        group="output",
+    )
 
 
 def wanted_of(request: Wanted) -> Wanted:

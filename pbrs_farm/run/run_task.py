@@ -110,6 +110,7 @@ def run_task(send: Send, setting: Setting, house_cache: HouseCache, task: Render
         source=task.source,
         view_id=task.view_id,
         layers=task.layers,
+        drops_radiance=task.drops_radiance,
         tell_share=lambda share: send(Message("share", f"{share:.4f}")),
     )
     failed: set[str] = set()

@@ -218,7 +218,7 @@ class Schedule:
         waiting = self._waiting[RENDER]
         n_before = len(waiting)
         for view in views:
-            task = RenderTask(house, steps, source, view, want.layers)
+            task = RenderTask(house, steps, source, view, want.layers, want.drop_radiance)
             self._begin(task, self._stages_of_view(task))
         waiting.rotate(len(waiting) - n_before)
 

@@ -21,6 +21,7 @@ from pbrs_farm.core.layers import LAYER, LAYERS, layers_in_digest
 from pbrs_farm.core.plugins import marks_in_digest, plugins
 from pbrs_farm.core.recipe import CAMERA_SOURCES, CameraFields, Recipe
 from pbrs_farm.formats.marker import Marker, StoredFile, read_marker
+from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
 from pbrs_farm.prepare import passes
 from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.regular_files import (
@@ -33,7 +34,7 @@ from pbrs_farm.regular_files import (
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.sample.camera_source import source_of
-from pbrs_farm.store.object_store import Store, put_done
+from pbrs_farm.store.object_store import Store, put_done, replace_marker
 from pbrs_farm.transport.scene_tables.material_rows import max_albedo
 
 
@@ -52,6 +53,7 @@ class Work:
     source: SourceRef | None = None  # only the house step reads it
     view_id: str | None = None  # of a step of a view
     layers: tuple[str, ...] = ()  # optional layers to write beside the present ones
+    drops_radiance: bool = False  # remove radiance.exr once the view is finished
     inputs: Mapping[str, str] = field(default_factory=dict)  # step it reads -> digest of its marker
     digest: str = ""  # of the step under way
     tell_share: Callable[[float], None] = unheard  # called with the share done of a long step
@@ -86,7 +88,58 @@ def run_unless_done(
 
     Raises BadInput if a step before it has not been done.
     """
-    # Compare the digest of all inputs with that of the present marker.
+    found = _looked_up(name, work)
+    key, old, is_valid, work = found.key, found.old, found.is_valid, found.work
+    if old is not None and found.is_done and not _must_trace_again(old, work):
+        return Outcome(old, was_done=True)
+    # Remove the marker before its files change, so that a crash leaves an unfinished step. Valid
+    # files outlast a step that fails to add to them.
+    if old is not None and not is_valid:
+        work.store.delete(key)
+
+    # Put the files, then the marker: in one write if the store packs them.
+    started = time.perf_counter()
+    output = function(work)
+    if is_valid:
+        work.store.delete(key)
+    data = {_file_key(work, name, file): output.files[file] for file in sorted(output.files)}
+    files = tuple(StoredFile(key=k, n_bytes=len(d), sha256=keys.sha256(d)) for k, d in data.items())
+    if old is not None:
+        _remove_stale(work, old, files)
+    marker = Marker(
+        step=name,
+        house_id=work.house_id,
+        view_id=work.view_id if plan.STEPS[name].per_view else None,
+        digest=work.digest,
+        files=files,
+        facts=output.facts,
+        seconds=round(time.perf_counter() - started, 3),
+        worker=f"{platform.node()}/{os.getpid()}",
+        attempt=attempt,
+        finished_utc=datetime.now(UTC).isoformat(timespec="seconds"),
+    )
+    put_done(work.store, key, marker.json_bytes(), data)
+    if output.unfinished:
+        work.store.delete(output.unfinished)
+    return Outcome(marker, was_done=False)
+
+
+@dataclass(frozen=True, slots=True)
+class _LookedUp:
+    """A step's marker, compared with the digest of all inputs."""
+
+    key: str  # of the marker
+    old: Marker | None
+    is_valid: bool  # only layers may be missing
+    work: Work  # with inputs, digest, and requested and present layers of the step
+
+    @property
+    def is_done(self) -> bool:
+        return self.old is not None and self.old.digest == self.work.digest
+
+
+def _looked_up(name: str, work: Work) -> _LookedUp:
+    """Compare the digest of all inputs with that of the present marker; BadInput as run_unless_done."""
     step = plan.STEPS[name]
     view_id = work.view_id if step.per_view else None
     inputs = _inputs(step, work)
@@ -102,39 +155,28 @@ def run_unless_done(
     is_valid = old is not None and old.digest == digest_of(written)
     if is_valid:
         work = replace(work, layers=_union(work.layers, written.layers))
-    digest = digest_of(work)
-    if old is not None and old.digest == digest:
-        return Outcome(old, was_done=True)
-    # Remove the marker before its files change, so that a crash leaves an unfinished step. Valid
-    # files outlast a step that fails to add to them.
-    if old is not None and not is_valid:
-        work.store.delete(key)
+    return _LookedUp(key, old, is_valid, replace(work, inputs=inputs, digest=digest_of(work)))
 
-    # Put the files, then the marker: in one write if the store packs them.
-    started = time.perf_counter()
-    output = function(replace(work, inputs=inputs, digest=digest))
-    if is_valid:
-        work.store.delete(key)
-    data = {_file_key(work, name, file): output.files[file] for file in sorted(output.files)}
-    files = tuple(StoredFile(key=k, n_bytes=len(d), sha256=keys.sha256(d)) for k, d in data.items())
-    if old is not None:
-        _remove_stale(work, old, files)
-    marker = Marker(
-        step=name,
-        house_id=work.house_id,
-        view_id=view_id,
-        digest=digest,
-        files=files,
-        facts=output.facts,
-        seconds=round(time.perf_counter() - started, 3),
-        worker=f"{platform.node()}/{os.getpid()}",
-        attempt=attempt,
-        finished_utc=datetime.now(UTC).isoformat(timespec="seconds"),
-    )
-    put_done(work.store, key, marker.json_bytes(), data)
-    if output.unfinished:
-        work.store.delete(output.unfinished)
-    return Outcome(marker, was_done=False)
+
+def _must_trace_again(old: Marker, work: Work) -> bool:
+    """True if light was dropped that the pictures need, since their recipe or layers have changed."""
+    is_dropped = old.step == "light" and not old.files
+    return is_dropped and not _looked_up("develop", work).is_done
+
+
+def drop_radiance(work: Work) -> None:
+    """Remove the light of a view whose pictures are done; its step stays done, without a file.
+
+    The marker changes before the file is removed. A process killed between them leaves a file that no marker
+    lists, which the next call removes.
+    """
+    key = keys.marker_key(work.house_id, "light", work.view_id)
+    marker = read_marker(work.store, key)
+    if marker is None or not _looked_up("develop", work).is_done:
+        return
+    if marker.files:
+        replace_marker(work.store, key, marker.model_copy(update={"files": ()}).json_bytes())
+    work.store.delete(keys.view_key(work.house_id, work.view_id or "", RADIANCE_EXR))
 
 
 def _written_layers(marker: Marker | None) -> tuple[str, ...]:

@@ -39,7 +39,14 @@ from pbrs_farm.raycast.variant import llvm_of_variant
 from pbrs_farm.run import plan
 from pbrs_farm.run.develop_step import view_histogram
 from pbrs_farm.run.light_checkpoint import LightCheckpoint
-from pbrs_farm.run.step_cache import Outcome, StepOutput, Work, required_source, run_unless_done
+from pbrs_farm.run.step_cache import (
+    Outcome,
+    StepOutput,
+    Work,
+    drop_radiance,
+    required_source,
+    run_unless_done,
+)
 from pbrs_farm.run.view_setup import ViewSetup, cached_house, marker_of_house, view_setup
 from pbrs_farm.transport.scene_tables.material_rows import max_albedo
 
@@ -384,7 +391,10 @@ def _facts_of_view(work: Work) -> dict[str, dict[str, Any]]:
 def run_step(name: str, work: Work, *, attempt: int = 1) -> Outcome:
     """Do one step unless its marker says it is done; see step_cache.run_unless_done."""
     note_step(work.source.location if work.source else work.house_id, name)
-    return run_unless_done(name, work, _FUNCTIONS[name], attempt=attempt)
+    outcome = run_unless_done(name, work, _FUNCTIONS[name], attempt=attempt)
+    if name == "view" and work.drops_radiance:
+        drop_radiance(work)
+    return outcome
 
 
 @functools.cache

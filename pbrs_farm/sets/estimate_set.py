@@ -86,6 +86,8 @@ class SetEstimate(Record):
     gpu_hours: float  # of light, if it is traced on an H100
     cpu_hours_beside_gpu: float
     gigabytes: float  # 10^9 bytes
+    gigabytes_with_radiance: float
+    gigabytes_without_radiance: float  # of parts with `drop_radiance`
     files: int  # of the parts
     parts: Mapping[str, Mapping[str, int | float]]
     clouds: tuple[CloudCost, ...]
@@ -118,6 +120,9 @@ def estimate_set(data_set: DataSet) -> SetEstimate:
     costs = {p.name: cost_of_run(p.recipe, p.want, p.n_houses) for p in data_set.parts}
     whole = sum(costs.values(), RunCost())
     n_bytes = whole.n_bytes + _form_bytes(data_set, costs)
+    dropped = sum(
+        costs[part.name].n_radiance_bytes for part in data_set.parts if part.want.drop_radiance
+    )
     parts = {
         name: {
             "houses": cost.n_houses,
@@ -135,6 +140,8 @@ def estimate_set(data_set: DataSet) -> SetEstimate:
         gpu_hours=round(whole.gpu_s / _HOUR_S, 2),
         cpu_hours_beside_gpu=round(whole.cpu_beside_gpu_s / _HOUR_S, 2),
         gigabytes=round(n_bytes / 1e9, 2),
+        gigabytes_with_radiance=round((n_bytes + dropped) / 1e9, 2),
+        gigabytes_without_radiance=round((n_bytes + dropped - whole.n_radiance_bytes) / 1e9, 2),
         files=round(whole.n_files),
         parts=parts,
         clouds=tuple(_on_cloud(name, of, whole, n_bytes) for name, of in prices().items()),
@@ -234,7 +241,8 @@ def estimate_text(estimate: SetEstimate) -> str:
         for c in e.clouds
     ]
     light = f"With light on an H100: {e.gpu_hours:,} GPU hours and {e.cpu_hours_beside_gpu:,} CPU hours."
-    return "\n".join([_text_of(sizes, rows), light, "", _text_of(costs, on_clouds)])
+    size = f"radiance.exr: {e.gigabytes_with_radiance:,} GB with it, {e.gigabytes_without_radiance:,} without (drop_radiance)."
+    return "\n".join([_text_of(sizes, rows), size, light, "", _text_of(costs, on_clouds)])
 
 
 def _text_of(columns: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:

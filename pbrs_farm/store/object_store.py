@@ -99,6 +99,10 @@ class PackingStore(Store, Protocol):
         """As the function put_done, for stores where the files of several steps share one object."""
         ...
 
+    def replace_marker(self, key: str, marker: bytes) -> None:
+        """As the function replace_marker."""
+        ...
+
 
 def put_done(store: Store, key: str, marker: bytes, files: Mapping[str, bytes]) -> None:
     """Put a step's files, and then its marker under `key`, if-absent.
@@ -113,6 +117,14 @@ def put_done(store: Store, key: str, marker: bytes, files: Mapping[str, bytes]) 
     for file, data in files.items():
         store.put(file, data)
     store.put_if_absent(key, marker)
+
+
+def replace_marker(store: Store, key: str, marker: bytes) -> None:
+    """Replace the marker of a step in one write. A PackingStore drops the step's files with it."""
+    if isinstance(store, PackingStore):
+        store.replace_marker(key, marker)
+    else:
+        store.put(key, marker)
 
 
 def check_key(key: str) -> str:

@@ -11,7 +11,7 @@ import pytest
 
 from pbrs_farm.check import verify
 from pbrs_farm.cli import main
-from pbrs_farm.core.recipe import Recipe, recipe_from_name
+from pbrs_farm.core.recipe import Recipe, ToneFields, recipe_from_name
 from pbrs_farm.images import array_from_png, exr_from_layers, layers_from_exr
 from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.run.local import run_local
@@ -74,6 +74,36 @@ def relit(view: Path, tmp_path: Path, *words: str) -> np.ndarray:
     out = tmp_path / "relit.png"
     assert main(["relight", str(view), "--out", str(out), *words]) == 0
     return array_from_png(out.read_bytes())
+
+
+def test_a_view_may_do_without_its_light(
+    root: Path, tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    copy = tmp_path / "copy"
+    shutil.copytree(root, copy)
+    view = next(copy.glob("houses/*/views/*"))
+    before = (view / "mlt_il_ol.png").read_bytes()
+    want = wanted(["mlt_il_ol"], [], 1).model_copy(update={"drop_radiance": True})
+
+    def dropped(recipe: Recipe) -> int:
+        summary = run_local(Run(["builtin"], str(copy), recipe, want, update=True))
+        assert summary.failures == []
+        assert not (view / "radiance.exr").exists()
+        return summary.n_done
+
+    assert dropped(small(groups="lamps")) == 0
+    assert b"radiance.exr" not in (copy / "manifest.jsonl").read_bytes()
+    certificate = verify(copy, sample=100)
+    assert certificate.is_clean, certificate.text()
+    assert "no radiance.exr to develop" in certificate.text()
+    assert main(["relight", str(view)]) == 1
+    assert "rendered with --drop-radiance" in capsys.readouterr().err
+    # Another tone needs the light again: light, develop, view.
+    other = small(groups="lamps").model_copy(update={"tone": ToneFields(contrast=1.2)})
+    assert dropped(other) == 3
+    assert (view / "mlt_il_ol.png").read_bytes() != before
+    assert dropped(small(groups="lamps")) == 3
+    assert (view / "mlt_il_ol.png").read_bytes() == before
 
 
 def test_every_lamp_is_named_and_those_that_light_the_view_have_a_layer(view: Path) -> None:

@@ -47,6 +47,20 @@ def test_light_is_samples_times_the_cost_of_one() -> None:
     assert lit.gigabytes > plain.gigabytes
 
 
+def test_dropped_light_counts_beside_the_sum(capsys: pytest.CaptureFixture[str]) -> None:
+    stored = estimate_set(set_from_bytes(of().encode(), "a.toml"))
+    text = of().replace("[part", "drop_radiance = true\n[part", 1)
+    dropped = estimate_set(set_from_bytes(text.encode(), "a.toml"))
+    radiance = 3_000 * 500_000 * measured()["radiance_bytes"] / 1e9
+    assert stored.gigabytes - dropped.gigabytes == pytest.approx(radiance, abs=0.02)
+    assert stored.files - dropped.files == 3_000
+    for estimate in (stored, dropped):
+        assert estimate.gigabytes_with_radiance == stored.gigabytes
+        assert estimate.gigabytes_without_radiance == dropped.gigabytes
+    assert main(["estimate", "indoor-1k"]) == 0
+    assert "GB with it" in capsys.readouterr().out
+
+
 def test_a_walk_has_its_frames_and_a_pair_two_pictures() -> None:
     walk = recipe_from_name("fast", {"cameras.source": "walk", "cameras.walk_frames": "12"})
     assert cost_of_run(walk, wanted([], []), 4).n_views == 48

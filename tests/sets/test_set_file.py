@@ -92,6 +92,8 @@ def test_a_shard_that_is_none_is_refused(word: str) -> None:
         ("[part.walks]", "[prt.walks]", r"rooms.toml: prt: is not a table of a set .*part"),
         ("[part.walks]", '[part."A b"]', r"rooms.toml: part.A b: a name may have lower-case letters"),
         ("[part.walks]", "[part.walks", r"rooms.toml: is not valid TOML: .*line \d+"),
+        ("frames = 12\n[form.yolo-depth]\nparts = [\"views\"]", "frames = 12\ndrop_radiance = true\n[form.hypersim]\n", r"rooms.toml: form.hypersim: part walks: .*radiance.exr: omit drop_radiance"),
+        ("frames = 12\n[form.yolo-depth]\nparts = [\"views\"]", "frames = 12\ndrop_radiance = true\n[form.coco]\nlayers=[\"radiance\"]", r"rooms.toml: form.coco: part walks: .*radiance.exr: omit drop_radiance"),
         ("dress = ", "select = ['blck']\ndress = ", r"rooms.toml \[part.views\]: select: blck is not a choice.*black"),
     ],
 )  # fmt: skip

@@ -5,7 +5,8 @@ from __future__ import annotations
 import io
 import tarfile
 from collections import Counter
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import replace
 from pathlib import Path
 
@@ -13,12 +14,12 @@ import pytest
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import ObjectMissing, StoreFailed, StoreUnavailable
-from pbrs_farm.core.recipe import recipe_from_name, with_settings
+from pbrs_farm.core.recipe import Recipe, recipe_from_name, with_settings
 from pbrs_farm.formats.marker import copy_done, read_marker
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.output_root import as_files, claim_root, finish_house, pull
-from pbrs_farm.run.step_cache import StepOutput, Work, run_unless_done
+from pbrs_farm.run.step_cache import StepOutput, Work, drop_radiance, run_unless_done
 from pbrs_farm.store import MemoryStore, Store, StoreSettings, store_from_url
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.store.laid_out import LaidOutStore, one_task
@@ -225,6 +226,76 @@ def test_killed_at_any_write_the_next_run_makes_the_rest_and_loses_nothing(n_wri
     view_done(again)
     assert all_of(again) == all_of(whole)
     assert before.items() <= all_of(again).items()
+
+
+def made_and_dropped(store: Store, recipe: Recipe = RECIPE) -> list[str]:
+    """Finish a view and remove its light. Returns the rendered steps."""
+    made = []
+    for steps in (LABELS, LIGHT):
+        with one_task(store, reads_whole=True) as task_store:
+            work = Work(task_store, recipe, HOUSE, HouseCache(), view_id=VIEW)
+            for name in steps:
+                output = StepOutput(FILES[name])
+                if not run_unless_done(name, work, lambda _work, output=output: output).was_done:
+                    made.append(name)
+            if steps == LIGHT:
+                drop_radiance(work)
+    return made
+
+
+def home_of_files(inner: CountingStore) -> Store:
+    claim_root(inner, RECIPE, update=False)
+    for step in ("house", "cameras", "illuminance"):
+        run_unless_done(step, Work(inner, RECIPE, HOUSE, HouseCache()), lambda _w: StepOutput({}))
+    return inner
+
+
+@pytest.mark.parametrize("layout", [prepared, home_of_files])
+@pytest.mark.parametrize("n_writes", range(18))
+def test_light_is_dropped_and_traced_once_whenever_a_run_is_killed(
+    layout: Callable[[CountingStore], Store], n_writes: int
+) -> None:
+    inner = CountingStore()
+    store = layout(inner)
+    inner.most_writes = n_writes
+    with suppress(StoreUnavailable):
+        made_and_dropped(store)
+    inner.most_writes = float("inf")
+    light = keys.marker_key(HOUSE, "light", VIEW)
+    was_traced = read_marker(store, light) is not None
+    again = LaidOutStore(inner)
+    made = made_and_dropped(again)
+    assert ("light" in made) == (not was_traced)
+    radiance = keys.view_key(HOUSE, VIEW, "radiance.exr")
+    assert radiance not in list(again.list("houses/"))
+    marker = read_marker(again, light)
+    assert marker is not None
+    assert marker.files == ()
+    finish_house(again, HOUSE)
+    manifest = again.get(keys.house_key(HOUSE, keys.MANIFEST))
+    assert b"mlt_il_ol.png" in manifest
+    assert b"radiance.exr" not in manifest
+    for key in again.list("houses/"):
+        if "/done/" in key and (marker := read_marker(again, key)) is not None:
+            assert all(again.head(file.key) is not None for file in marker.files)
+    assert made_and_dropped(again) == []
+
+
+@pytest.mark.parametrize("layout", [prepared, home_of_files])
+def test_dropped_light_is_traced_again_only_for_other_pictures(
+    layout: Callable[[CountingStore], Store],
+) -> None:
+    store = layout(CountingStore())
+    made_and_dropped(store)
+    other = with_settings(RECIPE, {"tone.contrast": 1.2})
+    assert made_and_dropped(store, other) == ["light", "develop", "view"]
+    assert made_and_dropped(store, other) == []
+    # Light that failed pictures need stays.
+    store.delete(keys.marker_key(HOUSE, "develop", VIEW))
+    with one_task(store, reads_whole=True) as task_store:
+        do(task_store, "light", recipe=other)
+        drop_radiance(Work(task_store, other, HOUSE, HouseCache(), view_id=VIEW))
+    assert store.get(keys.view_key(HOUSE, VIEW, "radiance.exr")) == FILES["light"]["radiance.exr"]
 
 
 def test_a_step_that_fails_leaves_those_before_it_done() -> None:

@@ -235,6 +235,7 @@ class HouseRunner:
             source=source,
             view_id=view,
             layers=spec.layers,
+            drops_radiance=spec.drop_radiance,
         )
         run_step(step, work, attempt=request.attempt)
 

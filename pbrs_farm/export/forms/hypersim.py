@@ -371,6 +371,7 @@ FORM = ViewForm(
     " also our `index.csv` and `README.md`; with `--split` one root whose table has the splits",
     finish=join_splits,
     lenses=("pinhole",),
+    reads_radiance=True,
     convention=Convention(
         0.5,
         has_k=True,

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import tempfile
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import partial
 from pathlib import Path
 from types import TracebackType
@@ -152,9 +152,7 @@ class Pool:
         yield Event("failed", task.house_id, task.view_id, worker.step, message=reason)
         remaining = tuple(s for s in task.steps if s != worker.step and s not in worker.done)
         if remaining:
-            self._begin(
-                worker, RenderTask(task.house_id, remaining, task.source, task.view_id, task.layers)
-            )
+            self._begin(worker, replace(task, steps=remaining))
         else:
             yield Event("end", task.house_id, task.view_id, "")
 

@@ -25,6 +25,7 @@ class RenderTask:
     source: SourceRef
     view_id: str | None = None
     layers: tuple[str, ...] = ()
+    drops_radiance: bool = False
 
 
 @dataclass(frozen=True, slots=True)
