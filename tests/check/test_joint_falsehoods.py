@@ -16,6 +16,7 @@ from scipy.spatial.transform import Rotation
 from pbrs_farm.check.cases import HouseCase, ScenesInTime
 from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.joint_checks import check_joints, row_of
+from pbrs_farm.check.solid_checks import check_models
 from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_mesh import Triangles, triangles_from_glb
 from pbrs_farm.core import classes
@@ -212,6 +213,16 @@ def test_what_only_a_source_states_is_listed_as_not_looked_at(stored: Stored) ->
         "hinges, values or limits",
     ]
     assert certificate.text().count("that only their source states") == 2
+
+
+def test_the_origin_of_a_model_with_one_instance_is_listed_as_not_looked_at(stored: Stored) -> None:
+    row = stored.rows[0] | {"pose": {"model": "crate", "world_from_model": np.eye(4).tolist()}}
+    tally = Tally()
+    house = StoredHouse(stored.folder, stored.document | {"items": [row]})
+    times = ScenesInTime(house, stored.own[row["instance"]])
+    check_models(HouseCase(house, stored.glb, times, tally))
+    (line,) = tally.certificate("", 1, 0, all_pixels=False).not_looked_at
+    assert line == "positions of a model's origin, of models with one instance in their home (1)"
 
 
 @pytest.mark.long
