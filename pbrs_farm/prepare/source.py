@@ -36,7 +36,7 @@ _MODEL_SUFFIXES: Final = (".obj", ".sh3f")  # files of `objects`; a .glb may be 
 # fmt: off
 _UNREAD_SUFFIXES: Final = frozenset({
     ".3dm", ".3ds", ".abc", ".blend", ".dae", ".dwg", ".dxf", ".fbx", ".max", ".mb", ".mtl", ".pln",
-    ".ply", ".rvt", ".sdf", ".skp", ".stl",
+    ".ply", ".rvt", ".skp", ".stl",
 })
 # fmt: on
 _MOST_NAMED: Final = 3  # maximum number of folders of homes in a hint

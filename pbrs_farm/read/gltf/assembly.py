@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import posixpath
+from collections.abc import Sequence
 from dataclasses import dataclass, field
 from typing import Any, Final
 
@@ -13,7 +14,7 @@ from pbrs_farm.formats.glb import Gltf
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.gltf.document import files_of_gltf, gltf_document, object_at
-from pbrs_farm.read.gltf.obj_document import files_of_obj, gltf_of_obj
+from pbrs_farm.read.gltf.obj_document import files_of_obj, gltf_of_mesh
 from pbrs_farm.regular_files import MAX_SCENE_BYTES
 
 _LIGHTS: Final = "KHR_lights_punctual"
@@ -26,6 +27,8 @@ _ARRAYS: Final = ("buffers", "bufferViews", "accessors", "meshes", "materials", 
 def files_of_asset(folder: RootFolder, name: str, files: SourceFiles) -> set[str]:
     """An asset and the buffers, material libraries and pictures outside it, as names below the folder."""
     data = folder.read(name, max_bytes=MAX_SCENE_BYTES) or b""
+    if name.lower().endswith(".stl"):
+        return {name}
     if name.lower().endswith(".obj"):
         return {name, *files_of_obj(data, folder, name, files)}
     parent = posixpath.dirname(name)
@@ -48,21 +51,28 @@ class Assembly:
         """The bytes of a picture by its name below the root; None without the file."""
         return self.folder.read(name, max_bytes=MAX_SCENE_BYTES)
 
-    def asset(self, name: str) -> tuple[list[int], Gltf] | None:
-        """Root nodes of an asset (glTF or OBJ) in the document, added if it is new; None without the file."""
-        if name in self.assets:
-            return self.assets[name]
+    def asset(
+        self, name: str, rgba: Sequence[float] | None = None
+    ) -> tuple[list[int], Gltf] | None:
+        """Root nodes of an asset (glTF, OBJ, STL) in the document, added if it is new; None without the file.
+
+        rgba: sRGB-encoded colour of an OBJ or STL without materials.
+        """
+        is_mesh = name.lower().endswith((".obj", ".stl"))
+        key = f"{name} {rgba}" if is_mesh else name
+        if key in self.assets:
+            return self.assets[key]
         data = self.fetch(name)
         if data is None:
             return None
         parent = posixpath.dirname(name)
-        if name.lower().endswith(".obj"):
-            gltf, at = gltf_of_obj(data, self.folder, name, self.max_triangles), ""
+        if is_mesh:
+            gltf, at = gltf_of_mesh(data, self.folder, name, self.max_triangles, rgba), ""
         else:
             gltf = gltf_document(data, name, lambda r: self.fetch(self.folder.name_from(parent, r)))
             at = parent
-        self.assets[name] = (self._added(gltf, at), gltf)
-        return self.assets[name]
+        self.assets[key] = (self._added(gltf, at), gltf)
+        return self.assets[key]
 
     def added(self, key: str, gltf: Gltf) -> list[int]:
         """Root nodes of a document without pictures, added if its key is new."""

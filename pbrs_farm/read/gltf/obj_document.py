@@ -1,4 +1,4 @@
-"""An OBJ and its material libraries as a glTF document. Effects: reads libraries."""
+"""An OBJ with its material libraries, or an STL, as a glTF document. Effects: reads libraries."""
 
 from __future__ import annotations
 
@@ -6,6 +6,7 @@ import math
 import posixpath
 import re
 from collections.abc import Iterable, Mapping, Sequence
+from dataclasses import replace
 from typing import Any, Final
 from urllib.parse import quote
 
@@ -18,18 +19,30 @@ from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import SourceFiles, read_mtl
 from pbrs_farm.read.mesh.mtl import ObjMaterial, laid
 from pbrs_farm.read.mesh.obj import Mesh, parse_obj
+from pbrs_farm.read.mesh.stl import parse_stl
 
+_GIVEN: Final = "given"  # name of the material of a model without materials
 _MTLLIB: Final = re.compile(rb"^mtllib[ \t]+(.+?)\s*$", re.MULTILINE)
 
 
-def gltf_of_obj(data: bytes, folder: RootFolder, name: str, max_triangles: int) -> Gltf:
-    """The document of a model, one node; name: of its file below the folder.
+def gltf_of_mesh(
+    data: bytes, folder: RootFolder, name: str, max_triangles: int, rgba: Sequence[float] | None
+) -> Gltf:
+    """The document of an OBJ or STL, one node; name: of its file below the folder.
 
-    Pictures are named from the root of the folder. Raises BadHouse as parse_obj does.
+    rgba: sRGB-encoded colour if it has no materials. Pictures are named from the root of the folder. Raises
+    BadHouse as parse_obj and parse_stl do.
     """
-    model = parse_obj(data, name, max_triangles=max_triangles)
-    mtl = materials_of_obj(model.mtllibs, folder, name)
-    document, writer = document_of_groups([("", model.meshes)], mtl, np.eye(4))
+    if name.lower().endswith(".stl"):
+        meshes, mtl = (parse_stl(data, name, max_triangles=max_triangles),), {}
+    else:
+        model = parse_obj(data, name, max_triangles=max_triangles)
+        meshes, mtl = model.meshes, materials_of_obj(model.mtllibs, folder, name)
+    if rgba is not None and not mtl:
+        red, green, blue, opacity = map(float, rgba)
+        mtl = {_GIVEN: ObjMaterial(_GIVEN, (red, green, blue), d=opacity)}
+        meshes = tuple(replace(mesh, material=_GIVEN) for mesh in meshes)
+    document, writer = document_of_groups([("", meshes)], mtl, np.eye(4))
     return writer.gltf(document, name)
 
 

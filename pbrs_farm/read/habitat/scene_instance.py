@@ -35,7 +35,7 @@ from pbrs_farm.read.gltf.document import meshes_of, numbers, object_at, placed_n
 from pbrs_farm.read.gltf.node_classes import Mapping
 from pbrs_farm.read.gltf.scene import house_of_gltf
 from pbrs_farm.read.robot.links import files_of_robot, model_name, placed_links, roots_of_robot
-from pbrs_farm.read.robot.urdf import MAX_BYTES, Robot, robot_from_urdf
+from pbrs_farm.read.robot.urdf import MAX_BYTES, Robot, Visual, robot_from_urdf
 from pbrs_farm.regular_files import text_from_bytes
 
 _CONFIG: Final = "*.scene_dataset_config.json"
@@ -387,8 +387,8 @@ def _add_robot(
     scale = float(np.cbrt(abs(np.linalg.det(world_from_robot[:3, :3])))) or 1.0
     parent = posixpath.dirname(urdf)
 
-    def roots_of(file: str) -> list[int] | None:
-        added = built.asset(model_name(file, dataset.folder, parent))
+    def roots_of(visual: Visual) -> list[int] | None:
+        added = built.asset(model_name(visual.file, dataset.folder, parent), visual.rgba)
         return added and added[0]
 
     node_of = placed_links(built, robot, roots_of, values, scale)

@@ -6,7 +6,7 @@ Links become nodes of one glTF scene for the reader of glTF. Both formats are z 
 from __future__ import annotations
 
 import posixpath
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from typing import Any, Final
 
 import numpy as np
@@ -25,12 +25,19 @@ from pbrs_farm.read.gltf.assembly import Assembly, files_of_asset
 from pbrs_farm.read.gltf.document import UNREAD, placed_nodes
 from pbrs_farm.read.gltf.node_classes import Mapping, mapping_from_json
 from pbrs_farm.read.gltf.scene import house_of_gltf, side_files
-from pbrs_farm.read.robot.links import PLANE, model_name, placed_links, roots_of_robot, solid_roots
+from pbrs_farm.read.robot.links import (
+    PLANE,
+    RootsOf,
+    model_name,
+    placed_links,
+    roots_of_robot,
+    solid_roots,
+)
 from pbrs_farm.read.robot.sdf import SdfModel, models_of_sdf
-from pbrs_farm.read.robot.urdf import GREY, MAX_BYTES, Link, Robot, Solid, robot_from_urdf
+from pbrs_farm.read.robot.urdf import GREY, MAX_BYTES, Link, Robot, Solid, Visual, robot_from_urdf
 
 _Y_UP: Final = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
-_MODELS: Final = (".glb", ".gltf", ".obj")
+_MODELS: Final = (".glb", ".gltf", ".obj", ".stl")
 _GROUND_M: Final = 0.1  # thickness of the floor made of a plane
 _MOST_JSON_BYTES: Final = 16 * 2**20
 
@@ -165,14 +172,15 @@ class _Scene:
         if self._n_unread:
             self._notes.add(UNREAD, "visual", f"{self._n_unread} shapes are not read")
 
-    def _roots_of(self, at: str) -> Callable[[str], list[int] | None]:
-        def roots_of(reference: str) -> list[int] | None:
+    def _roots_of(self, at: str) -> RootsOf:
+        def roots_of(visual: Visual) -> list[int] | None:
+            reference = visual.file
             try:
                 name = model_name(reference, self.built.folder, at)
                 if not name.lower().endswith(_MODELS):
                     self._foreign.add(name)
                     return None
-                added = self.built.asset(name)
+                added = self.built.asset(name, visual.rgba)
             except BadHouse as error:
                 text = f"{error.message[:200]}; it is left out"
                 self._notes.add("unreadable-model", reference[:100], text)

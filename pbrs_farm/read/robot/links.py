@@ -19,12 +19,12 @@ from pbrs_farm.read.gltf.node_joints import KEY, joint_row
 from pbrs_farm.read.gltf.obj_document import document_of_groups
 from pbrs_farm.read.mesh.mtl import ObjMaterial
 from pbrs_farm.read.mesh.obj import Mesh
-from pbrs_farm.read.robot.urdf import Robot, Solid
+from pbrs_farm.read.robot.urdf import Robot, Solid, Visual
 
 PLANE: Final = "plane"
 _ROUND: Final = 24  # segments around a round shape
-RootsOf = Callable[[str], "list[int] | None"]
-"""A model as a robot's file names it -> its root nodes; None without the file."""
+RootsOf = Callable[[Visual], "list[int] | None"]
+"""The model of a visual -> its root nodes; None without the file."""
 
 
 def placed_links(
@@ -40,7 +40,7 @@ def placed_links(
     for link in robot.links:
         for visual in link.visuals:
             if visual.solid is None:
-                models = roots_of(visual.file)
+                models = roots_of(visual)
             elif visual.solid.kind == PLANE:
                 continue  # the ground
             else:

@@ -257,12 +257,13 @@ def _joint(row: Element, parent_from_joint: F64, model_from_joint: F64, file: st
 def _visual(row: Element, link_from_own: F64, file: str, place: str) -> Visual | None:
     matrix = np.asarray(link_from_own @ _pose(row, file, place))
     uri = (row.findtext("geometry/mesh/uri") or "").strip()
+    colour = row.findtext("material/diffuse") or row.findtext("material/ambient")
+    rgba = numbers_of(colour, GREY, file, place)
     if uri:
         scale = row.findtext("geometry/mesh/scale")
         matrix[:3, :3] *= numbers_of(scale, (1.0, 1.0, 1.0), file, place)
-        return Visual(uri, matrix)
-    colour = row.findtext("material/diffuse") or row.findtext("material/ambient")
-    solid = solid_of(row, numbers_of(colour, GREY, file, place), file, place)
+        return Visual(uri, matrix, rgba=tuple(rgba.clip(0, 1)))
+    solid = solid_of(row, rgba, file, place)
     return None if solid is None else Visual("", matrix, solid)
 
 

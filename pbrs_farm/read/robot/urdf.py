@@ -49,6 +49,7 @@ class Visual:
     file: str  # as the robot's file names it; "" for a solid
     link_from_model: F64  # (4, 4), with its scale
     solid: Solid | None = None
+    rgba: tuple[float, ...] | None = None  # sRGB-encoded colour of a model without materials
 
 
 @dataclass(frozen=True, slots=True)
@@ -119,7 +120,7 @@ class Robot:
 def robot_from_urdf(data: bytes, file: str, notes: Notes | None = None) -> Robot:
     """The links and joints of a URDF; BadHouse where it is damaged, or its joints make no tree.
 
-    Collision shapes and masses are not read, nor the materials of models, which have their own.
+    Collision shapes and masses are not read, nor the materials of models that have their own.
     notes: of a home, of whose links a damaged one is left out with a note, and all below it.
     """
     root = parsed_xml(data, file, "robot")
@@ -217,14 +218,14 @@ def _visuals(
     place = f"link {str(row.get('name'))[:60]}"
     for visual in row.findall("visual"):
         mesh, matrix = visual.find("geometry/mesh"), _origin(visual, file, place)
-        if mesh is not None and mesh.get("filename"):
-            matrix[:3, :3] *= numbers_of(mesh.get("scale"), (1.0, 1.0, 1.0), file, place)
-            visuals.append(Visual(str(mesh.get("filename")), matrix))
-            continue
         named = visual.find("material")
         colour = named if named is None or len(named) else colours.get(str(named.get("name")))
         said = None if colour is None else colour.find("color")
         rgba = numbers_of(None if said is None else said.get("rgba"), GREY, file, place)
+        if mesh is not None and mesh.get("filename"):
+            matrix[:3, :3] *= numbers_of(mesh.get("scale"), (1.0, 1.0, 1.0), file, place)
+            visuals.append(Visual(str(mesh.get("filename")), matrix, rgba=tuple(rgba.clip(0, 1))))
+            continue
         solid = solid_of(visual, rgba, file, place)
         n_unread += solid is None
         if solid is not None:

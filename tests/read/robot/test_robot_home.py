@@ -12,9 +12,10 @@ import pytest
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.geometry.solids import box
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve
-from tests.inputs.robot_files import BOXES, write_sdf, write_urdf
+from tests.inputs.robot_files import BOXES, RED, write_sdf, write_urdf
 from tests.read.gltf.gltf_scenes import Scene
 
 Write = Callable[[Path], Path]
@@ -69,7 +70,11 @@ def test_a_mesh_is_turned_scaled_and_lit_as_its_model_says(tmp_path: Path) -> No
     ("uri", "kind", "text"),
     [
         ("gone.glb", "missing-model", "1 models are not here: gone.glb"),
-        ("mug.dae", "unread-part", "1 models are not read; models are .glb, .gltf, .obj: mug.dae"),
+        (
+            "mug.dae",
+            "unread-part",
+            "1 models are not read; models are .glb, .gltf, .obj, .stl: mug.dae",
+        ),
         ("damaged.glb", "unreadable-model", "it is left out"),
         ("../../mug.glb", "unreadable-model", "leads out of the folder"),
     ],
@@ -163,3 +168,41 @@ def test_a_world_that_includes_itself_ends(tmp_path: Path) -> None:
     path.write_text(f"<sdf><world name='w'/>{include * 3}</sdf>")
     with pytest.raises(BadHouse, match="more than 10000 models and includes"):
         house(path)
+
+
+def _stl(*, is_binary: bool, damage: str = "") -> bytes:
+    """A cube of one metre about the origin."""
+    cube = box("", np.zeros(3), np.full(3, 0.5), 0)
+    corners = cube.positions[cube.faces].astype("<f4")
+    if is_binary:
+        facets = b"".join(bytes(12) + facet.tobytes() + bytes(2) for facet in corners)
+        return bytes(80) + len(corners).to_bytes(4, "little") + facets
+    rows = ["solid cube"]
+    for facet in corners.tolist():
+        vertices = [f"vertex {x} {y} {z}" for x, y, z in facet]
+        rows += ["facet normal 0 0 0", "outer loop", *vertices, "endloop", "endfacet"]
+    return (
+        "\n".join([*rows, "endsolid"]).replace("vertex 0.5", f"vertex {damage or 0.5}")
+    ).encode()
+
+
+@pytest.mark.parametrize("is_binary", [True, False])
+def test_an_stl_has_sharp_edges_and_its_visuals_colour(tmp_path: Path, is_binary: bool) -> None:
+    (tmp_path / "mug.stl").write_bytes(_stl(is_binary=is_binary))
+    colour = f"<material><diffuse>{RED}</diffuse></material></visual>"
+    model = MUG.format(uri="mug.stl", more="").replace("</visual>", colour)
+    home = house(write_sdf(tmp_path, model))
+    mug = item(home, "mug")
+    assert np.ptp(mug.bounds, axis=0) == pytest.approx([0.1, 0.2, 0.1], abs=1e-6)
+    (surface,) = mug.surfaces
+    assert surface.normals is not None
+    assert np.abs(surface.normals).max(1) == pytest.approx(np.ones(24), abs=1e-6)
+    red, green, _blue = home.materials[surface.material].diffuse
+    assert red > 5 * green
+
+
+@pytest.mark.parametrize("data", [b"", _stl(is_binary=False, damage="wide"), bytes(84)])
+def test_a_damaged_stl_is_a_note(tmp_path: Path, data: bytes) -> None:
+    (tmp_path / "mug.stl").write_bytes(data)
+    home = house(write_sdf(tmp_path, MUG.format(uri="mug.stl", more="")))
+    assert [n.kind for n in home.notes] == ["unreadable-model"]
