@@ -59,6 +59,7 @@ def _routes() -> list[Route]:
     return [
         Route("/", lists.homes),
         Route("/views", lists.views),
+        Route("/contents", lists.contents),
         Route("/progress", lists.progress),
         Route("/homes/{house}", lists.home),
         Route("/homes/{house}/house.glb", house_scene.house_glb),

@@ -112,6 +112,26 @@ def test_lists_are_json_on_request(client: httpx.Client) -> None:
     assert "<html" in client.get("/views", headers=browser).text
 
 
+def test_the_contents_count_views_by_class_room_objects_light_and_verdict(tmp_path: Path) -> None:
+    root = write_root(tmp_path / "root", {"a-1": ("0_0_1", "0_1_0"), "b-2": ()})
+    lit = {"modes": {"light": {"floor_lux": {"outdoor": 40.0, "indoor": 60.0}}}}
+    write_view(root / "houses/b-2/views/0_0_2", **lit)
+    write_view(root / "houses/b-2/views/0_0_3", instances="none", modes={"light": {"floor_lux": 3}})
+    (root / "houses/b-2/views/0_0_3/depth.png").unlink()
+    with served(str(root), tmp_path / "cache") as client:
+        charts = client.get("/contents?format=json").json()
+        html = client.get("/contents").text
+    assert charts["Classes in view"] == {"wall": 3, "chair": 3}
+    assert charts["Rooms"] == {"Kitchen": 3, "Bath": 1}
+    assert charts["Objects in view"] == {"below 5": 4}
+    assert charts["Light on the floor, lx"] == {"50 to 200": 1}
+    assert (charts["Layers"]["depth"], charts["Layers"]["mlt_il_ol"]) == (3, 4)
+    assert charts["Selection"] == {}
+    assert charts["Credits (homes)"] == {"by A. Person": 2}
+    assert "4 views" in html
+    assert '<meter min="0" max="3" value="1">' in html
+
+
 def test_a_views_camera_is_python_to_paste(tmp_path: Path) -> None:
     camera = Camera.look_at((1, 1.5, 2), (3, 1, 2.5), size=(WIDTH, HEIGHT), hfov_deg=70)
     facts = {

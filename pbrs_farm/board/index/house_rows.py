@@ -32,6 +32,8 @@ class ViewRow:
     classes: int  # bit k: NYU40 class k is in view
     warnings: tuple[str, ...]
     score: float = 0.0  # of the camera's choice, larger is better
+    n_objects: int = 0  # instances in view
+    lux: float | None = None  # of the room's floor by all light; None if not measured
 
 
 @dataclass(frozen=True, slots=True)
@@ -89,6 +91,8 @@ def _view_row(
         classes=_class_bits(facts.get("instances")),
         warnings=tuple(texts[:_MAX_WARNINGS]),
         score=finite(facts.get("score")),
+        n_objects=len(instances) if isinstance(instances := facts.get("instances"), list) else 0,
+        lux=_lux(facts),
     )
 
 
@@ -96,6 +100,13 @@ def finite(value: Any) -> float:
     """A finite number of a stored file; 0 for any other value."""
     is_number = isinstance(value, int | float) and math.isfinite(value)
     return float(value) if is_number else 0.0
+
+
+def _lux(facts: dict[str, Any]) -> float | None:
+    modes = facts.get("modes")
+    light = modes.get("light") if isinstance(modes, dict) else None
+    by_group = light.get("floor_lux") if isinstance(light, dict) else None
+    return sum(map(finite, by_group.values())) if isinstance(by_group, dict) else None
 
 
 def _class_bits(instances: Any) -> int:

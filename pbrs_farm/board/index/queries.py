@@ -6,6 +6,7 @@ import json
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import asdict, dataclass, fields, replace
 from functools import lru_cache
+from itertools import pairwise
 from typing import Any, Final, Generic, TypeVar
 from urllib.parse import urlencode
 
@@ -22,6 +23,7 @@ HOMES_PER_PAGE: Final = 24
 _MAX_WORD: Final = 120  # characters of a filter's value
 _MAX_PAGE: Final = 10_000_000
 _MAX_MENU: Final = 200  # entries
+_MAX_BARS: Final = 40  # of a chart
 VERDICTS: Final = {"kept": "Kept", "refused": "Refused", "unjudged": "Not judged"}
 _CLASS_NUMBER: Final = {name: k for k, name in enumerate(NYU40_NAMES) if k}
 
@@ -153,6 +155,7 @@ class Queries:
         self._index = index
         self._count = lru_cache(maxsize=256)(self._counted)
         self._menu = lru_cache(maxsize=8)(self._menus)
+        self._contents = lru_cache(maxsize=8)(self._counted_contents)
 
     def views(self, view_filter: ViewFilter) -> Page[ListedView]:
         """The views of a page, or of the last one, by house and id."""
@@ -210,6 +213,45 @@ class Queries:
         """Name of a filter -> (value, text) of its options, at most 200."""
         return self._menu(self._index.generation)
 
+    def contents(self) -> dict[str, list[tuple[str, int]]]:
+        """Title of a chart -> (label, number of views) of its bars; of credits numbers of homes."""
+        return self._contents(self._index.generation)
+
+    def _counted_contents(self, _generation: int) -> dict[str, list[tuple[str, int]]]:
+        bits: list[tuple[int, int, int]] = [
+            (r["classes"], r["layers"], r["n"])
+            for r in self._index.rows(
+                "SELECT classes, layers, count(*) AS n FROM view GROUP BY classes, layers"
+            )
+        ]
+        classes = {
+            name: sum(n for seen, _layers, n in bits if seen >> k & 1)
+            for name, k in _CLASS_NUMBER.items()
+        }
+        layers = {
+            name: sum(n for _seen, stored, n in bits if stored & bit)
+            for name, bit in LAYER_BIT.items()
+        }
+        return {
+            "Classes in view": _largest(classes),
+            "Rooms": self._bars("SELECT room, count(*) FROM view GROUP BY 1 ORDER BY 2 DESC"),
+            "Objects in view": self._bars(_in_bins("n_objects", (5, 10, 20, 40, 80))),
+            "Light on the floor, lx": self._bars(_in_bins("lux", (10, 50, 200, 1000, 5000))),
+            "Layers": _largest(layers),
+            "Selection": self._bars(
+                "SELECT iif(reason = '', 'kept', reason), count(*) FROM view"
+                " WHERE reason IS NOT NULL GROUP BY 1 ORDER BY 2 DESC"
+            ),
+            "Credits (homes)": self._bars(
+                "SELECT iif(credit = '', 'no credit required', credit), count(*) FROM house"
+                " GROUP BY 1 ORDER BY 2 DESC"
+            ),
+        }
+
+    def _bars(self, sql: str) -> list[tuple[str, int]]:
+        rows = self._index.rows(f"{sql} LIMIT {_MAX_BARS}")
+        return [(str(label), int(n)) for label, n in rows]
+
     def n_views(self) -> int:
         """Number of views."""
         return self._count("", (), self._index.generation)
@@ -250,6 +292,20 @@ class Queries:
                 if layers & LAYER_BIT[layer.name] and layer.name != "radiance"
             ],
         }
+
+
+def _largest(counts: Mapping[str, int]) -> list[tuple[str, int]]:
+    bars = sorted(counts.items(), key=lambda bar: (-bar[1], bar[0]))
+    return [bar for bar in bars[:_MAX_BARS] if bar[1]]
+
+
+def _in_bins(column: str, limits: tuple[int, ...]) -> str:
+    """SQL of the numbers of views by the bins of a column, between consecutive limits."""
+    ends = [f"WHEN {column} < {limits[0]} THEN 'below {limits[0]:,}'"]
+    ends += [f"WHEN {column} < {b} THEN '{a:,} to {b:,}'" for a, b in pairwise(limits)]
+    case = f"CASE {' '.join(ends)} ELSE '{limits[-1]:,} or more' END"
+    known = f"WHERE {column} IS NOT NULL"
+    return f"SELECT {case}, count(*) FROM view {known} GROUP BY 1 ORDER BY min({column})"
 
 
 _NAMED: Final = "(name || ' ' || id) LIKE ? ESCAPE '\\'"

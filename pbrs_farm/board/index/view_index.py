@@ -16,7 +16,7 @@ from typing import Any, Final
 from pbrs_farm.board.index.house_rows import HouseRow
 from pbrs_farm.core.lighting import ALL_MODES
 
-_VERSION: Final = 2  # of the tables below and of covers
+_VERSION: Final = 3  # of the tables below and of covers
 _SCHEMA: Final = f"""
 PRAGMA journal_mode = WAL;
 CREATE TABLE IF NOT EXISTS house (
@@ -27,6 +27,7 @@ CREATE TABLE IF NOT EXISTS house (
 CREATE TABLE IF NOT EXISTS view (
     house TEXT NOT NULL, id TEXT NOT NULL, room TEXT NOT NULL, layers INTEGER NOT NULL,
     classes INTEGER NOT NULL, warnings TEXT NOT NULL, reason TEXT,
+    n_objects INTEGER NOT NULL, lux REAL,
     PRIMARY KEY (house, id)
 ) WITHOUT ROWID;
 CREATE INDEX IF NOT EXISTS view_of_room ON view (room, house, id);
@@ -125,9 +126,19 @@ def _enter_house(connection: sqlite3.Connection, house: HouseRow, fingerprint: s
     )
     connection.execute("DELETE FROM view WHERE house = ?", (house.id,))
     connection.executemany(
-        "INSERT INTO view VALUES (?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO view VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
         (
-            (house.id, v.id, v.room, v.layers, v.classes, json.dumps(v.warnings), reasons.get(v.id))
+            (
+                house.id,
+                v.id,
+                v.room,
+                v.layers,
+                v.classes,
+                json.dumps(v.warnings),
+                reasons.get(v.id),
+                v.n_objects,
+                v.lux,
+            )
             for v in house.views
         ),
     )

@@ -111,6 +111,15 @@ def home(request: Request) -> Response:
     )
 
 
+def contents(request: Request) -> Response:
+    """GET /contents: the numbers of views by class, room, objects, light, layer and verdict."""
+    charts = board_of(request).queries.contents()
+    if asks_for_json(request):
+        return JSONResponse({title: dict(bars) for title, bars in charts.items()})
+    n_views = board_of(request).queries.n_views()
+    return page(request, "contents.html", charts=charts, n_views=n_views)
+
+
 def progress(request: Request) -> Response:
     """GET /progress: progress of reading the root as JSON; "" at the end."""
     now = board_of(request).refresher.progress
