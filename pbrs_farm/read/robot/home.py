@@ -131,10 +131,11 @@ class _Scene:
         self.built.roots.append(self._turned(roots, model.world_from_model))
 
     def add_ground(self) -> None:
-        """Add a floor below everything where a plane is the only floor: planes have no end."""
-        boxes = [] if self._ground is None or self._has_floor else list(self._boxes())
-        if not boxes:
+        """Add a floor below the walls, else below everything, if a plane is the only floor."""
+        rows = [] if self._ground is None or self._has_floor else list(self._boxes())
+        if not rows:
             return
+        boxes = [box for is_wall, box in rows if is_wall] or [box for _, box in rows]
         low, high = np.min([b[0] for b in boxes], 0), np.max([b[1] for b in boxes], 0)
         middle = np.eye(4)
         middle[:3, 3] = [(low[0] + high[0]) / 2, self._ground, (low[2] + high[2]) / 2]
@@ -146,9 +147,12 @@ class _Scene:
         self.built.roots.append(len(nodes))
         nodes.append(row)
 
-    def _boxes(self) -> Iterator[F64]:
-        """(2, 3) the box of each placed mesh, y up."""
+    def _boxes(self) -> Iterator[tuple[bool, F64]]:
+        """Whether a placed mesh is a wall's, and (2, 3) its box, y up."""
         gltf = self.built.gltf()
+        names = [str(node.get("name", "")) for node in gltf.document["nodes"]]
+        classes = [class_of_node_name(name) for name in names]
+        walls = {k for k, c in enumerate(classes) if c is not None and c.kind is ItemKind.WALL}
         accessors = gltf.document.get("accessors", [])
         for node in placed_nodes(gltf):
             mesh = gltf.document["nodes"][node.index].get("mesh")
@@ -158,7 +162,8 @@ class _Scene:
                     ends = zip(bounds["min"], bounds["max"], strict=True)
                     corners = np.array(np.meshgrid(*ends, indexing="ij")).reshape(3, 8).T
                     points = transform_points(node.world_from_node, corners)
-                    yield np.stack([points.min(0), points.max(0)])
+                    box = np.stack([points.min(0), points.max(0)])
+                    yield not walls.isdisjoint(node.path), box
 
     def note_losses(self) -> None:
         """Note the models that are missing or in other formats, and the shapes that are not read."""

@@ -151,11 +151,17 @@ def test_walls_of_one_model_on_a_plane_are_a_room(tmp_path: Path) -> None:
         '<sdf version="1.6"><world name="default"><include><uri>model://sun</uri></include>'
         "<include><uri>model://ground_plane</uri></include>"
         f'<model name="my_house"><pose>9 9 0 0 0 0</pose>{walls}</model><state world_name="default">'
-        '<model name="my_house"><pose>1 0 0 0 0 0</pose></model></state></world></sdf>'
+        '<model name="my_house"><pose>1 0 0 0 0 0</pose></model></state><model name="far_ball">'
+        '<pose>90 0 1 0 0 0</pose><link name="link"><visual name="v"><geometry><sphere><radius>1</radius>'
+        "</sphere></geometry></visual></link></model></world></sdf>"
     )
     home = house(path)
-    assert home.notes == ()
-    assert {i.name for i in home.items} == {"ground", *(n for n in BOXES if n.startswith("wall"))}
+    assert [n.kind for n in home.notes] == ["unmapped-class"]
+    assert {i.name for i in home.items} == {
+        "ground",
+        "far_ball",
+        *(n for n in BOXES if n.startswith("wall")),
+    }
     (room,) = home.rooms
     assert room.polygon.min(0) == pytest.approx([1, -3], abs=0.01)
     assert room.polygon.max(0) == pytest.approx([5, 0], abs=0.01)
