@@ -53,6 +53,9 @@ def read_robot(given: GivenFile, fields: ReadFields) -> House:
     scene = _Scene(Assembly(name, folder, fields.max_model_triangles), notes)
     for model in _models(folder, name, notes):
         scene.add(model)
+    if not scene.built.roots:
+        hint = "give a folder that holds the file and its models: --models FOLDER"
+        raise BadHouse(name, "", "none of its models is here", hint=hint)
     scene.add_ground()
     scene.note_losses()
     parent, mapping = posixpath.dirname(name), Mapping()

@@ -130,6 +130,13 @@ def test_a_change_of_an_included_model_is_seen(tmp_path: Path) -> None:
     assert before != resolve(str(path)).companions != ""
 
 
+def test_a_world_without_any_of_its_models_says_so(tmp_path: Path) -> None:
+    path = tmp_path / "house.world"
+    path.write_text("<sdf><world><include><uri>model://house</uri></include></world></sdf>")
+    with pytest.raises(BadHouse, match=r"none of its models is here.*--models FOLDER"):
+        house(path)
+
+
 def test_a_single_robot_is_no_home(tmp_path: Path) -> None:
     path = tmp_path / "arm.urdf"
     box = '<visual><geometry><box size="1 1 1"/></geometry></visual>'
@@ -156,7 +163,7 @@ def test_walls_of_one_model_on_a_plane_are_a_room(tmp_path: Path) -> None:
         "</sphere></geometry></visual></link></model></world></sdf>"
     )
     home = house(path)
-    assert [n.kind for n in home.notes] == ["unmapped-class"]
+    assert home.notes == ()
     assert {i.name for i in home.items} == {
         "ground",
         "far_ball",
