@@ -21,6 +21,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadRecipe
 from pbrs_farm.core.recipe import Recipe, recipe_from_json
 
+_LIT = ("mlt_il_ol", "mlt_ol")
 # Lines of the card that no stored file repeats.
 _UNCHECKED = ("- Layers beside", "pbrs-farm make", "sha256sum", "```", "The file has the digest")
 
@@ -131,8 +132,11 @@ def check_card(case: SetCase) -> None:
 def _counted(stored: StoredSet, line: str) -> str:
     """The line; lists in an order that the user chose as their sorted words, seeds of dressing as their number."""
     if line.startswith("- Pictures: "):
-        modes, _comma, size = line[12:].rpartition(", ")
-        return f"- Pictures: {', '.join(sorted(modes.split(', ')))}, {size}"
+        words, _comma, size = line[12:].rpartition(", ")
+        modes = set(words.split(", "))
+        # either mode of light writes both pictures
+        modes |= set(_LIT) if modes & set(_LIT) else set()
+        return f"- Pictures: {', '.join(sorted(modes))}, {size}"
     match = re.fullmatch(r"(- Homes: \d+), dressed by ([\d, ]+?)(?: and (\d+) more)?\.", line)
     if match is None:
         return line

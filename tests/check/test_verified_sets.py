@@ -45,6 +45,22 @@ def test_a_true_set_is_clean(finished_set: Path, capsys: pytest.CaptureFixture[s
     assert "done/*.json digest: a digest of inputs that only `make` reads" in omitted
 
 
+@pytest.mark.long
+def test_a_set_without_its_light_is_clean(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    file, out = small_set(tmp_path / "in"), tmp_path / "out"
+    text = file.read_text().replace('["opengl_dl"]', '["mlt_il_ol"]\ndrop_radiance = true')
+    file.write_text(text.replace("set = [", 'set = [\n  "light.spp=2",', 1))
+    assert main(["make", str(file), "--out", str(out)]) == 0
+    assert list(out.rglob("mlt_il_ol.png"))
+    assert not list(out.rglob("radiance.exr"))
+    assert "radiance.exr" not in (out / "SHA256SUMS").read_text()
+    capsys.readouterr()
+    assert main(["verify", str(out)]) == 0
+    assert "no radiance.exr to develop" in capsys.readouterr().out
+
+
 FIRST = {check: kind for kind, (_plant, check) in reversed(KINDS.items())}
 
 
