@@ -4,7 +4,7 @@ masses.csv has a construction per material: a wall of some thickness around a fi
 handbooks: chipboard 650 kg/m3 (EN 312 has 600 to 700), glass 2,500 (EN 572), stone and china 2,400, plastic 1,000,
 paper 700, cloth 300 around foam and feathers of 40. Housings of appliances are steel sheets of 0.6 mm. A leaf of a
 door is two skins and a frame around a light core, together as heavy as 19 mm of chipboard: 20 to 24 kg for
-0.85 m x 2 m, between leaves with honeycomb (15 kg) and with tubular chipboard (30 kg).
+0.85 m x 2 m: our estimate, between a honeycomb core and tubular chipboard.
 """
 
 from __future__ import annotations
