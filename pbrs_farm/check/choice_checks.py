@@ -8,6 +8,7 @@ from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy.spatial.transform import Rotation
 
 from pbrs_farm.check.axes import is_rigid, opencv_pose, opencv_transform
@@ -26,6 +27,7 @@ _COUNT_PX = 6  # the same of a small item
 _COINCIDENT_M = 1e-4  # distance between coincident surfaces
 _HEADROOM_M = 0.5  # of a camera above its room's ceiling: a balcony ends at its rail
 _EYE_M = 2.0  # highest camera above a floor without a ceiling
+_OUTSIDE = "out"  # room of a camera outside all rooms
 _HOME_RULES = ("near_duplicate",)  # refuse a view for others of the home
 
 
@@ -94,6 +96,12 @@ def _check_report(case: HouseCase, report: Mapping[str, Any]) -> None:
         judge("camera preset", house.id, tally, report=report, recipe=recipe)
 
 
+def _is_inside(room: Mapping[str, Any], eye: NDArray[Any]) -> bool:
+    x, y, z = eye
+    is_level = room["floor_y"] < y < room["ceiling_y"]
+    return bool(is_level and is_within(room["polygon"], np.array([x, z])))
+
+
 def _check_view(case: HouseCase, row: Mapping[str, Any]) -> None:
     """Pose, room and counted pixels of a view."""
     house, place = case.house, f"{row['id']} in cameras.json"
@@ -103,7 +111,11 @@ def _check_view(case: HouseCase, row: Mapping[str, Any]) -> None:
         return
     room = house.rooms.get(str(row["room"]))
     if house.rooms and not keys.is_object(house.id):
-        expect(room is not None or not row["room"], "is of no room")
+        is_known = room is not None or row["room"] in ("", _OUTSIDE)
+        expect(is_known, "is of no room")
+        rooms = (r["name"] for r in house.rooms.values() if _is_inside(r, pose[:3, 3]))
+        inside = next(rooms, None) if row["room"] == _OUTSIDE else None
+        expect(inside is None, f"is in room {inside}, not outside")
     if room is not None and row["origin"] in ("sampled", "walk"):
         x, y, z = pose[:3, 3]
         floor, ceiling = room["floor_y"], room["ceiling_y"]

@@ -22,6 +22,7 @@ from pbrs_farm.check.finishes import has_roughness
 from pbrs_farm.check.picture_checks import moved_copies
 from pbrs_farm.check.pixel_checks import albedo_of_faces
 from pbrs_farm.check.stored_house import StoredHouse
+from pbrs_farm.check.tiles import tile_means
 from pbrs_farm.core.arrays import F64, Bools
 
 COAT = 0.04  # reflectance of a coat at normal incidence: glass of index 1.5
@@ -44,7 +45,10 @@ _NOISY = 0.09  # error of the slope above which noise hides everything
 _LEAST_SLOPE = 0.15  # of steps of light over those of albedo, whose logarithms rise alike
 _LEAST_SIGMAS = 3.0  # of the slope at the stored place
 _TIE_SIGMAS = 2.0  # by which another place may fit better by chance
+_LIT = 0.1  # of all light, below which a group does not light an edge
 _GROUP_SIGMAS = 5.0  # the same of a light group alone, which may reach few of the edges
+_TILE_SIGMAS = 3.5  # of the mean gain of tiles, by which another place fits better all over
+_PAIR_SIGMAS = 3.0  # the same of pairs exchanged, which are four places and not all
 _EXCHANGED_SIGMAS = 4.0  # of a slope below 0: one in 30,000 by chance
 
 
@@ -190,31 +194,41 @@ def check_fit(case: ViewCase) -> None:
     bright = ndimage.binary_dilation(bright, iterations=_BRIGHT_PX)
     logs_of_albedo = _filled(np.log(level.pop("albedo") + _FAINT), bright)
     place = f"{case.place}/radiance.exr"
-    if int((np.hypot(*_steps(logs_of_albedo)) > _EDGE).sum()) < _FEW_EDGES:
+    edges = np.hypot(*_steps(logs_of_albedo)) > _EDGE
+    if int(edges.sum()) < _FEW_EDGES:
         case.tally.note(f"{place} has too few edges to compare")
         return
     _check_exchanged(case, sharp, bright)
-    surface = _Transformed.of(logs_of_albedo)
+    surface, albedo_steps = _Transformed.of(logs_of_albedo), _steps(logs_of_albedo)
     level["all light"] = level["outdoor"] + level["indoor"]
     for name, light in level.items():
-        if not (light > 0).any():
+        # The few edges that a group lights, as lamps do from outside, say nothing of its place.
+        is_lit = light > _LIT * level["all light"]
+        if int((edges & is_lit).sum()) < _FEW_EDGES:
             continue
         logs = _filled(_logs(light), bright)
-        slope, error, elsewhere = _slopes(logs, surface)
+        slope, error, elsewhere, shift = _slopes(logs, surface)
         if error > _NOISY:
             if name == "all light":
                 case.tally.note(f"{place} has more noise than edges: {name} is not compared")
             continue
-        slopes = {"moved": elsewhere}
-        slopes |= {word: _slopes(copy, surface)[0] for word, copy in moved_copies(logs).items()}
+        steps = _steps(logs)
+        own = _products(steps, albedo_steps)
+        moved = {"moved": (elsewhere, [np.roll(s, shift, (0, 1)) for s in steps])}
+        for word, copy in moved_copies(logs).items():
+            moved[word] = _slopes(copy, surface)[0], _steps(copy)
         slack = (_TIE_SIGMAS if name == "all light" else _GROUP_SIGMAS) * error
         expect = case.expect("light edges", "radiance.exr")
-        for word, moved_slope in slopes.items():
+        for word, (moved_slope, moved_steps) in moved.items():
             fault = f"{name} fits the albedo better {word} ({moved_slope:.2f}) than in place ({slope:.2f})"  # fmt: skip
-            expect(moved_slope <= slope + slack, fault)
+            is_near = moved_slope <= slope + slack
+            gain = _products(moved_steps, albedo_steps) - own
+            expect(is_near or not _is_all_over(gain), fault)
         if name == "all light":
             fault = f"{name} does not follow the albedo: {slope:.2f} +- {error:.2f}"
-            expect(slope >= max(_LEAST_SIGMAS * error, _LEAST_SLOPE), fault)
+            least = max(_LEAST_SIGMAS * error, _LEAST_SLOPE)
+            lack = least * _products(albedo_steps, albedo_steps) - own
+            expect(slope >= least or not _is_all_over(lack), fault)
 
 
 def _logs(light: NDArray[Any]) -> NDArray[Any]:
@@ -240,7 +254,10 @@ def _check_exchanged(case: ViewCase, level: dict[str, NDArray[Any]], bright: Boo
         error = float(np.sqrt((((light - slope * albedo) * albedo) ** 2).sum())) / energy
         name = ("rows", "columns")[axis]
         fault = f"all light fits the albedo better with {name} exchanged in pairs: {slope:.2f} +- {error:.2f} as stored"  # fmt: skip
-        case.expect("light edges", "radiance.exr")(slope > -_EXCHANGED_SIGMAS * error, fault)
+        is_right = slope > -_EXCHANGED_SIGMAS * error or not _is_all_over(
+            -light * albedo, _PAIR_SIGMAS
+        )
+        case.expect("light edges", "radiance.exr")(is_right, fault)
 
 
 def _steps_of_pairs(picture: NDArray[Any], axis: int, first: int) -> F64:
@@ -292,8 +309,24 @@ class _Transformed:
         return _Transformed(tuple(np.conj(np.fft.rfft2(s)) for s in steps), energy)
 
 
-def _slopes(light: NDArray[Any], surface: _Transformed) -> tuple[float, float, float]:
-    """Steps of light over those of the surface: the slope, its error, and the largest elsewhere.
+def _products(steps: list[F64], others: list[F64]) -> F64:
+    """(H, W) products of steps, across and down together."""
+    return np.asarray(sum(a * b for a, b in zip(steps, others, strict=True)))
+
+
+def _is_all_over(gain: F64, sigmas: float = _TILE_SIGMAS) -> bool:
+    """True if a gain (H, W) is that of most tiles, not of a few lines only.
+
+    The edges of an empty room are a few lines, along which a patch of sun or a shadow may run.
+    """
+    tiles = tile_means(gain[..., None]).ravel()
+    return float(tiles.mean()) > sigmas * float(tiles.std()) / len(tiles) ** 0.5
+
+
+def _slopes(
+    light: NDArray[Any], surface: _Transformed
+) -> tuple[float, float, float, tuple[int, int]]:
+    """Steps of light over those of the surface: the slope, its error, the largest elsewhere, the shift to there.
 
     The error is the spread over all other places, which a Fourier transform compares together.
     """
@@ -302,7 +335,8 @@ def _slopes(light: NDArray[Any], surface: _Transformed) -> tuple[float, float, f
     slope = float(slopes[0, 0])
     slopes[0, 0] = -np.inf
     rest = slopes[np.isfinite(slopes)]
-    return slope, float(rest.std()), float(rest.max())
+    down, right = np.unravel_index(int(slopes.argmax()), slopes.shape)
+    return slope, float(rest.std()), float(rest.max()), (-int(down), -int(right))
 
 
 def _correlation(light: NDArray[Any], surface: _Transformed) -> tuple[F64, float]:

@@ -1,21 +1,28 @@
-"""Small output roots of every sort: films, pairs, lamps, edited, generated, read from six formats.
+"""Small output roots of every sort: films, pairs, lamps, edited, generated, read from eight formats, own cameras.
 
 Effects: renders into folders. None needs a download.
 """
 
 from __future__ import annotations
 
+import itertools
+import json
 import tempfile
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
+from typing import Any
+from unittest import mock
 
 import pbrs_farm as pf
 from pbrs_farm.core.recipe import recipe_from_name
-from pbrs_farm.run.local import run_local
+from pbrs_farm.prepare.home_kinds import object_source
+from pbrs_farm.read.objects.model_folders import find_models
+from pbrs_farm.run import local
 from pbrs_farm.run.local_run import Run
 from pbrs_farm.run.plan import wanted
 from tests.check.roots import all_layers
 from tests.inputs.sound_files import every_format
+from tests.read.gltf.gltf_scenes import two_rooms
 from tests.scene.homes import can, crate, small_home
 
 _SMALL = {
@@ -24,7 +31,17 @@ _SMALL = {
     "cameras.score_width_px": "160", "cameras.score_height_px": "120",
 }  # fmt: skip
 _WALK = {"cameras.source": "walk", "cameras.walk_frames": "4", "cameras.walk_fps": "12"}
-_READ = ("glTF", "OpenUSD", "IFC", "SUNCG", "Sweet Home 3D", "ProcTHOR and Holodeck")
+_SURFACES = ("albedo", "normal_shading", "material")
+_READ = (
+    "OBJ",
+    "URDF and SDF",
+    "glTF",
+    "OpenUSD",
+    "IFC",
+    "SUNCG",
+    "Sweet Home 3D",
+    "ProcTHOR and Holodeck",
+)
 
 Make = Callable[[Path], None]
 
@@ -39,7 +56,9 @@ def rendered(
         recipe = recipe_from_name("preview", _SMALL | dict(words or {}))
         names = all_layers() if layers is None else layers
         run = Run([word], str(root), recipe, wanted((), names, n_views, pairs=pairs))
-        failures = run_local(run).failures
+        # One process loads the renderer, not two.
+        with mock.patch.object(local, "finishes_apart", return_value=False):
+            failures = local.run_local(run).failures
         if failures:
             raise RuntimeError(f"{word}: {failures}")
 
@@ -80,13 +99,86 @@ def _opened(root: Path) -> None:
     pf.render(home, look, modes=["opengl_dl"], layers=["part"]).save(root)
 
 
-def _read(title: str) -> Make:
+def pictured(
+    home: Callable[[Path], pf.Home],
+    *looks: pf.Camera,
+    layers: tuple[str, ...] = _SURFACES,
+    **words: Any,
+) -> Make:
+    """Pictures of a home by own cameras, or by the view that it chooses; home: gets an empty folder."""
+
     def make(root: Path) -> None:
         with tempfile.TemporaryDirectory() as name:
-            path = every_format()[title](Path(name))
-            rendered(str(path), layers=("albedo", "normal_shading", "material"))(root)
+            settings = {k.replace("__", "."): v for k, v in words.items()}
+            chosen = home(Path(name)).set(**_SMALL | settings)
+            pf.render(chosen, looks or chosen.cameras(n=1), layers=layers).save(root)
 
     return make
+
+
+def _look(eye: Sequence[float], target: Sequence[float]) -> pf.Camera:
+    return pf.Camera.look_at(eye, target, size=(160, 120), hfov_deg=70)
+
+
+def _small_home(_folder: Path) -> pf.Home:
+    return small_home()
+
+
+def _lamps_set(_folder: Path) -> pf.Home:
+    return small_home().light("floor lamp", lm=900, kelvin=2700).open("door_inner", 0.5)
+
+
+def _read(title: str) -> Callable[[Path], pf.Home]:
+    return lambda folder: pf.load(every_format()[title](folder), recipe="preview")
+
+
+def _room_round_walls(folder: Path) -> pf.Home:
+    """A room whose only lamp is between inner walls, which shade most of its floor."""
+    corners = [(6, 4.2), (6, 6), (3, 6), (3, 3), (6, 3)]
+    walls = [{"start": a, "end": b, "thickness": 0.1} for a, b in itertools.pairwise(corners)]
+    plan = {
+        "height": 2.5, "walls": walls,
+        "rooms": [{"type": "living", "polygon": [(0, 0), (9, 0), (9, 9), (0, 9)]}],
+        "doors": [{"at": (9, 1), "entrance": True}],
+    }  # fmt: skip
+    (folder / "plan.json").write_text(json.dumps(plan))
+    return pf.load(folder / "plan.json", recipe="preview")
+
+
+def _french_window(folder: Path) -> pf.Home:
+    """A room with a glazed door."""
+    plan = {
+        "height": 2.5,
+        "rooms": [{"type": "living", "polygon": [(0, 0), (4, 0), (4, 4), (0, 4)]}],
+        "doors": [{"at": (4, 1), "entrance": True}],
+        "windows": [{"at": (2, 0), "width": 1.0, "height": 2.1, "sill": 0.0}],
+    }  # fmt: skip
+    (folder / "plan.json").write_text(json.dumps(plan))
+    return pf.load(folder / "plan.json", recipe="preview")
+
+
+def _cabinets(folder: Path) -> pf.Home:
+    """Two cabinets whose fronts coincide over 20 cm, one of them with a worktop of its height."""
+    scene = two_rooms()
+    scene.node("Cabinet.001", mesh=scene.box([1.0, 0, 0.01], [1.6, 0.9, 0.6]))
+    scene.node("Cabinet.002", mesh=scene.box([1.4, 0, 0.01], [2.0, 0.9, 0.6]))
+    scene.node("Worktop", mesh=scene.box([1.0, 0.86, 0.01], [1.6, 0.9, 0.6]))
+    (folder / "home.glb").write_bytes(scene.glb())
+    return pf.load(folder / "home.glb", recipe="preview")
+
+
+def _doors_that_open(root: Path) -> None:
+    """A walk while doors open."""
+    home = small_home().set(**_SMALL | _WALK).open("door_*", at={0: 0.1, 0.25: 1})
+    pf.render_homes(home, root, layers=("flow_forward", "part"), tracks=True)
+
+
+def _model_alone(root: Path) -> None:
+    with tempfile.TemporaryDirectory() as name:
+        folder = Path(name)
+        crate(folder)
+        word = object_source(find_models([folder])[0]).location
+        rendered(word, layers=_SURFACES)(root)
 
 
 ROOTS: dict[str, Make] = {
@@ -106,5 +198,14 @@ ROOTS: dict[str, Make] = {
     "generated": rendered("made:3", layers=("albedo", "normal_shading")),
     "generated, with a balcony, mirrors and sun": rendered("made:11", {"light.denoise": "true", "light.spp": "16"}, n_views=4, layers=("albedo",)),
     "generated, with a lamp of rods": rendered("made:22", {"cameras.cell_m": "0.25", "cameras.score_width_px": "80", "cameras.score_height_px": "60"}, n_views=4, layers=()),
-    **{f"read from {title}": _read(title) for title in _READ},
+    **{f"read from {title}": pictured(_read(title)) for title in _READ},
+    "seen from outside": pictured(_small_home, _look((-4, 2, -3), (2, 1, 2)), _look((2, 7, 2), (2, 0, 2.1))),
+    "a room round inner walls": pictured(_room_round_walls, _look((0.7, 1.6, 0.7), (3, 0, 8))),
+    "a French window": pictured(_french_window, _look((2.6, 1.5, 3.6), (2, 1, 0))),
+    "coincident cabinets": pictured(_cabinets, _look((1.6, 1.4, 2.6), (1.5, 0.5, 0))),
+    "a fisheye at night": pictured(_small_home, lens__model="fisheye", lens__hfov_deg=180, sky__time="night"),
+    "a sphere": pictured(_small_home, lens__model="equirect", image__width_px=160, image__height_px=80),
+    "lamps set and a door open": pictured(_lamps_set),
+    "doors that open": _doors_that_open,
+    "a model alone": _model_alone,
 }  # fmt: skip
