@@ -28,12 +28,13 @@ from pbrs_farm.geometry.scene_triangles import SceneTriangles
 from pbrs_farm.geometry.surface_points import surface_points
 
 _Options = TypeVar("_Options", bound=Record)
-COLLISION: Final = "convex parts within 5 mm, no more than 32"
+COLLISION: Final = "convex parts within 5 mm, no more than 128"
 COLLIDES: Final = f"items collide as {COLLISION}"
 _MOST_KG: Final = 150.0
 _LARGE_M: Final = 0.5  # maximum size of a loose piece that opens
 _RESTING_M: Final = 0.03  # maximum gap between an item and its support
 _FOOT_M: Final = 0.01  # height of an item's feet
+_DRAPED_M: Final = 0.04  # spacing of points on the underside of a cloth
 WALKER_M: Final = 0.2  # radius of the walker on the navigable floor
 _HEAD_M: Final = 1.6  # height of the walker
 _STEP_M: Final = 0.05  # maximum height of a step, as over rugs
@@ -136,7 +137,7 @@ class Piece:
     def colliders(self) -> tuple[F64, ...]:
         """Convex parts (V, 3) of all its bodies, local; () of the building and of items without surfaces.
 
-        No part reaches more than 5 mm beyond the mesh, as long as 32 parts are enough; all are included.
+        No part reaches more than 5 mm beyond the mesh, as long as 32 parts, or 128 separate boards, are enough.
         """
         if self.is_building:
             return ()
@@ -284,10 +285,10 @@ def _lamp(light: LightPart) -> Lamp:
 
 
 def _rests(scene: SceneTriangles, index: int) -> bool:
-    """True if an item has a support: a floor, a top, a shelf, the bottom of a drawer.
+    """True if an item has a support: a floor, a top, a shelf, the bottom of a drawer; or a bed below a duvet.
 
     The support is within 3 cm of its feet in height, below a quarter of them, and on both sides of its
-    middle along x or along z.
+    middle along x or along z; or below half of all its underside.
     """
     corners = scene.of_item(index)
     if not len(corners):
@@ -295,17 +296,29 @@ def _rests(scene: SceneTriangles, index: int) -> bool:
     low, high = scene.bounds[index]
     points = surface_points(corners[corners[:, :, 1].min(1) < low[1] + _FOOT_M], _FOOT_M)
     feet = points[points[:, 1] < low[1] + _FOOT_M]
+    borne = _borne(scene, index, feet, low[1])
+    if len(borne) >= _BORNE * len(feet) and len(borne):
+        middle = (low + high)[[0, 2]] / 2
+        sides = (borne.min(0) <= middle + _FOOT_M) & (borne.max(0) >= middle - _FOOT_M)
+        if sides.any():
+            return True
+    points = surface_points(corners, _DRAPED_M)
+    points = points[np.argsort(points[:, 1], kind="stable")]
+    _, first = np.unique(np.rint(points[:, [0, 2]] / _DRAPED_M), axis=0, return_index=True)
+    underside = points[first]
+    return len(_borne(scene, index, underside, high[1])) >= len(underside) / 2
+
+
+def _borne(scene: SceneTriangles, index: int, points: F64, top: float) -> F64:
+    """(N, 2) places of those of an item's points that have a support; top: the highest of them."""
+    low, high = scene.bounds[index]
     reach = np.array([0.0, _RESTING_M, 0.0])
-    below, owners = scene.in_box(low - reach, np.array([high[0], low[1], high[2]]) + reach)
-    below = below[owners != index]
-    places = feet[:, [0, 2]]
-    tops = highest_below(places, below, feet[:, 1] + _RESTING_M)
-    borne = places[tops > feet[:, 1] - _RESTING_M - _FOOT_M]
-    if len(borne) < _BORNE * len(places) or not len(borne):
-        return False
-    middle = (low + high)[[0, 2]] / 2
-    sides = (borne.min(0) <= middle + _FOOT_M) & (borne.max(0) >= middle - _FOOT_M)
-    return bool(sides.any())
+    below, owners = scene.in_box(low - reach, np.array([high[0], top, high[2]]) + reach)
+    # Contents of an open cupboard are no support, although they are near its underside.
+    below = below[(owners != index) & (scene.bounds[owners, 0, 1] <= low[1] + _FOOT_M / 2)]
+    places = points[:, [0, 2]]
+    tops = highest_below(places, below, points[:, 1] + _RESTING_M)
+    return np.asarray(places[tops > points[:, 1] - _RESTING_M - _FOOT_M])
 
 
 def _walkable(room: Room, pieces: Sequence[Piece]) -> list[F64]:

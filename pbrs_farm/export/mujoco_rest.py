@@ -1,12 +1,14 @@
 """Rest poses of the loose bodies of a MuJoCo model: overlapping bodies are moved apart, then all fall; no effects.
 
 Furniture of a home may overlap by centimetres (a chair's leg and a table's), and a simulation would throw
-such bodies about. They are moved apart first, by the smallest distance that frees them.
+such bodies about. They are moved apart first, by the smallest distance that frees them. Two that cannot be
+parted, like a bed and its duvet, are to be joined.
 """
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
+from collections.abc import Set as AbstractSet
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -17,7 +19,7 @@ from pbrs_farm.core.arrays import F64, Bools
 _DEEP_M: Final = 2e-3  # maximum penetration of bodies that are not moved apart
 _FREE_M: Final = 5e-4  # maximum penetration of a moved body
 _WAYS_M: Final = (0.005, 0.01, *np.arange(0.02, 0.16, 0.02))  # distances by which a body is moved
-_MOST_PARTED: Final = 60
+_MOST_PARTED: Final = 200  # moves of bodies, and failed tries
 _FALL_S: Final = 4.0  # time for coming to rest
 _SLOW_S: Final = 0.6  # time of slow sinking at first, so that hovering bodies do not jump
 _SLOW: Final = (0.2, 0.7)  # m/s, rad/s
@@ -29,10 +31,11 @@ _TIPPED_RAD: Final = 0.35
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Rest:
-    """Poses of bodies, and which of them found no rest."""
+    """Poses of bodies, and which of them found no rest. With joined pairs no body has fallen yet."""
 
     poses: F64  # (N, 7) place and quaternion (w, x, y, z) of each body
     restless: Bools  # (N,)
+    joined: tuple[tuple[int, int], ...] = ()  # pairs of bodies that overlap for good
 
 
 def rest_of(world: Any, names: Sequence[str], areas_m2: Sequence[float]) -> Rest:
@@ -46,8 +49,8 @@ def rest_of(world: Any, names: Sequence[str], areas_m2: Sequence[float]) -> Rest
     state = mujoco.MjData(world)
     mujoco.mj_forward(world, state)
     start = _poses(world, state, names)
-    restless = _move_apart(mujoco, world, state, names, areas_m2)
-    if not restless.any():
+    restless, joined = _move_apart(mujoco, world, state, names, areas_m2)
+    if not restless.any() and not joined:
         _fall(mujoco, world, state)
         before = _poses(world, state, names)
         for _ in range(int(_LOOK_S / world.opt.timestep)):
@@ -58,7 +61,7 @@ def rest_of(world: Any, names: Sequence[str], areas_m2: Sequence[float]) -> Rest
         cosine = np.abs((after[:, 3:] * start[:, 3:]).sum(1))
         restless |= 2 * np.arccos(np.clip(cosine, 0, 1)) > _TIPPED_RAD
         restless |= ~np.isfinite(after).all(1)
-    return Rest(_poses(world, state, names), restless)
+    return Rest(_poses(world, state, names), restless, joined)
 
 
 def _poses(world: Any, state: Any, names: Sequence[str]) -> F64:
@@ -66,31 +69,36 @@ def _poses(world: Any, state: Any, names: Sequence[str]) -> F64:
     return np.array([state.qpos[k : k + 7] for k in starts], np.float64).reshape(-1, 7)
 
 
-def _is_movable(pair: tuple[int, int], body_of: Mapping[int, int], stuck: Bools) -> bool:
-    """True if a pair has a loose body and no stuck one."""
-    loose = [body_of[body] for body in pair if body in body_of]
-    return bool(loose) and not stuck[loose].any()
-
-
 def _move_apart(
     mujoco: Any, world: Any, state: Any, names: Sequence[str], areas_m2: Sequence[float]
-) -> Bools:
-    """Move bodies until none overlap; returns the bodies that no small move frees."""
+) -> tuple[Bools, tuple[tuple[int, int], ...]]:
+    """Move bodies until none overlap; returns those that nothing frees from the home, and pairs of them."""
     body_of = {int(world.body(name).id): k for k, name in enumerate(names)}
     stuck = np.zeros(len(names), bool)
+    joined: dict[tuple[int, int], tuple[int, int]] = {}
     for _ in range(_MOST_PARTED):
         pairs = {
             pair: depth
             for pair, depth in _depths(world, state).items()
-            if depth > _DEEP_M and _is_movable(pair, body_of, stuck)
+            if depth > _DEEP_M and pair not in joined
         }
+        loose_of = {pair: [body_of[body] for body in pair if body in body_of] for pair in pairs}
+        pairs = {p: d for p, d in pairs.items() if loose_of[p] and not stuck[loose_of[p]].any()}
         if not pairs:
             break
         pair = max(pairs, key=lambda p: (pairs[p], p))
-        loose = sorted((body_of[b] for b in pair if b in body_of), key=lambda k: areas_m2[k])
-        if not any(_freed(mujoco, world, state, names[k]) for k in loose):
-            stuck[loose[0]] = True
-    return stuck
+        loose = sorted(loose_of[pair], key=lambda k: areas_m2[k])
+        for k in loose:
+            # Smaller bodies make way afterwards, like the contents of a lifted table.
+            smaller = {b for b, n in body_of.items() if areas_m2[n] < areas_m2[k]} - set(pair)
+            if _freed(mujoco, world, state, names[k], smaller):
+                break
+        else:
+            if len(loose) == 2:
+                joined[pair] = (loose[0], loose[1])
+            else:
+                stuck[loose[0]] = True
+    return stuck, tuple(joined.values())
 
 
 def _depths(world: Any, state: Any) -> dict[tuple[int, int], float]:
@@ -103,8 +111,8 @@ def _depths(world: Any, state: Any) -> dict[tuple[int, int], float]:
     return depths
 
 
-def _freed(mujoco: Any, world: Any, state: Any, name: str) -> bool:
-    """Move a body by the shortest way, level or up, to a free place; True if there is one."""
+def _freed(mujoco: Any, world: Any, state: Any, name: str, ignored: AbstractSet[int]) -> bool:
+    """Move a body by the shortest way, level or up, to a place free of all but ignored bodies; True if there is one."""
     start, body = int(world.joint(name).qposadr[0]), int(world.body(name).id)
     home = state.qpos[start : start + 3].copy()
     angles = np.arange(8) * np.pi / 4
@@ -115,7 +123,8 @@ def _freed(mujoco: Any, world: Any, state: Any, name: str) -> bool:
             mujoco.mj_kinematics(world, state)
             mujoco.mj_collision(world, state)
             depths = _depths(world, state)
-            if max((d for pair, d in depths.items() if body in pair), default=0.0) < _FREE_M:
+            met = (d for pair, d in depths.items() if body in pair and not ignored & set(pair))
+            if max(met, default=0.0) < _FREE_M:
                 return True
     state.qpos[start : start + 3] = home
     mujoco.mj_kinematics(world, state)

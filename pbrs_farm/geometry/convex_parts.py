@@ -66,13 +66,14 @@ def close_parts(triangles: F64, *, within_m: float = 0.005, most: int = 32) -> t
     """Decompose triangles (F, 3, 3) into convex parts (V, 3); returns at least one part.
 
     Connected components are separated, then cut along their axes, worst first, until no hull extends
-    more than within_m beyond the mesh or there are `most` parts. Hollows stay open; boards and legs
-    are reproduced exactly.
+    more than within_m beyond the mesh or there are `most` parts. Up to 4 x `most` components stay
+    apart, so that no shelf of a wide bookcase is filled. Hollows stay open; boards and legs are
+    reproduced exactly.
     """
     turn = rotation_y(_level_turn(triangles))
     groups = [_fronts_outwards(group) for group in connected(triangles @ turn)]
     thing = _Thing.of(groups, within_m)
-    if len(groups) <= most:
+    if len(groups) <= 4 * most:
         parts = [thing.part((group,)) for group in groups]
     else:
         parts = [thing.part(tuple(groups))]

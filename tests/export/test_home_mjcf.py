@@ -10,9 +10,11 @@ import mujoco
 import numpy as np
 import pytest
 
-from pbrs_farm.core.house import House
+from pbrs_farm.core.classes import NYU40_NAMES
+from pbrs_farm.core.house import Box, House
 from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.export.export_homes import export_house
+from pbrs_farm.export.forms.mjcf import FIXED
 from pbrs_farm.geometry.opened import item_at
 from tests.export.homes import repaired_home
 from tests.inputs.cupboards import WIDE, cupboard
@@ -108,6 +110,51 @@ def test_overlapping_items_are_separated_and_at_rest(tmp_path: Path) -> None:
         mujoco.mj_step(model, state)
     assert np.abs(state.xpos - before).max() < 1e-3
     assert model.nv == 12
+
+
+def motion(model: Any, seconds: float = 1.0) -> float:
+    """Largest way of a body, metres."""
+    state = mujoco.MjData(model)
+    mujoco.mj_forward(model, state)
+    before = state.xpos.copy()
+    for _ in range(int(seconds / model.opt.timestep)):
+        mujoco.mj_step(model, state)
+    return float(np.abs(state.xpos - before).max())
+
+
+def test_a_table_in_a_rug_is_lifted_with_its_contents(tmp_path: Path) -> None:
+    rug = replace(loose("rug", (-1, 0, -1), (1, 0.01, 1)), nyu40=NYU40_NAMES.index("floor mat"))
+    table, mug = (
+        loose("table", (0, 0, 0), (0.6, 0.5, 0.6)),
+        loose("mug", (0.2, 0.5, 0.2), (0.3, 0.6, 0.3)),
+    )
+    model = model_of(small_home(rug, table, mug), tmp_path)
+    assert model.nv == 12
+    assert motion(model) < 1e-3
+
+
+def test_a_bed_and_its_duvet_are_joined_and_at_rest(tmp_path: Path) -> None:
+    bed, top = (
+        loose("bed", (0, 0, 0), (1, 0.5, 2)),
+        loose("duvet", (-0.02, 0.48, 0.2), (1.02, 0.52, 2.02)),
+    )
+    sides = [loose("", (x, 0.1, 0.2), (x + 0.04, 0.52, 2.02)) for x in (-0.03, 0.99)]
+    surfaces = (*top.surfaces, *(s for side in sides for s in side.surfaces))
+    box = Box(np.array([0.5, 0.31, 1.11]), np.array([0.53, 0.21, 0.91]), np.eye(3))
+    model = model_of(small_home(bed, replace(top, surfaces=surfaces, box=box)), tmp_path)
+    assert (model.nv, model.neq) == (12, 1)
+    assert motion(model) < 1e-3
+
+
+def test_an_item_without_rest_is_named_in_the_model(tmp_path: Path) -> None:
+    case = replace(loose("case", (0, 0, 0), (1, 1, 1)), nyu40=NYU40_NAMES.index("cabinet"))
+    mug = loose("mug", (0.45, 0, 0.45), (0.55, 0.1, 0.55))
+    model = model_of(small_home(case, mug), tmp_path)
+    assert model.nv == 0
+    k = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_TEXT, FIXED)
+    start, size = model.text_adr[k], model.text_size[k]
+    assert bytes(model.text_data[start : start + size]).rstrip(b"\0") == b"mug"
+    assert "1 item did not come to rest and is fixed: mug" in (tmp_path / "remarks.txt").read_text()
 
 
 @pytest.mark.long

@@ -50,6 +50,14 @@ def test_an_item_is_loose_if_something_below_supports_it(thing: Item, is_loose: 
     assert home.pieces[2].is_fixed != is_loose
 
 
+def test_the_contents_of_a_wall_cupboard_are_no_support() -> None:
+    cupboard = loose("cupboard", (0, 1.5, 0), (0.6, 1.516, 0.3))
+    mug = loose("mug", (0.2, 1.516, 0.1), (0.4, 1.6, 0.2))
+    _floor, on_wall, inside = exported_home(small_home(cupboard, mug)).pieces
+    assert on_wall.is_fixed
+    assert not inside.is_fixed
+
+
 def test_deliberately_floating_items_stay_in_place() -> None:
     mug = loose("mug", (0.4, 0.505, 0.1), (0.48, 0.6, 0.18))
     for tags, is_fixed in (((), False), ((FLOATING,), True)):

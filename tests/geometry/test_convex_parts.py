@@ -73,6 +73,20 @@ def test_no_part_is_lost_if_there_are_more_than_the_limit() -> None:
     assert all(is_in_any(parts, (k * 0.1 + 0.01, 0.01, 0.01)) for k in range(50))
 
 
+def test_the_shelves_of_a_wide_bookcase_stay_open() -> None:
+    # 40 boards, more than the parts that a closed mesh is cut into.
+    boards = [
+        solid(
+            (0.5 * (k // 10), 0.2 * (k % 10), 0),
+            (0.5 * (k // 10) + 0.48, 0.2 * (k % 10) + 0.02, 0.3),
+        )
+        for k in range(40)
+    ]
+    parts = close_parts(np.concatenate(boards))
+    assert len(parts) == 40
+    assert not is_in_any(parts, (0.2, 0.1, 0.1))
+
+
 def test_a_slanting_sheet_is_a_millimetre_thick() -> None:
     slope = np.array([[[0.0, 0, 0], [1, 1, 0], [1, 1, 1]], [[0, 0, 0], [1, 1, 1], [0, 0, 1]]])
     (part,) = close_parts(slope)

@@ -34,7 +34,8 @@ from pbrs_farm.export.passing import passing_pairs
 from pbrs_farm.installation import need
 
 _STEP_S: Final = 0.002
-_ROUNDS: Final = 5  # rounds of falling; restless bodies are fixed after each
+_ROUNDS: Final = 8  # rounds of falling; restless bodies are fixed after each
+FIXED: Final = "fixed_without_rest"  # name of the model's text with their names
 _ON_BOX_M: Final = 1e-4  # maximum distance of a box's corners from its sides
 
 
@@ -45,11 +46,16 @@ def write_mjcf(home: ExportedHome, folder: Path) -> None:
     path = folder / f"{home.house.id}.xml"
     write_files(folder, model.files | {path.name: xml_bytes(model.root)})
     fixed = _settle(model, path)
+    if fixed:
+        custom = ET.SubElement(model.root, "custom")
+        ET.SubElement(custom, "text", name=FIXED, data=" ".join(fixed))
     path.write_bytes(xml_bytes(model.root))
     if fixed:
-        (folder / REMARKS).write_text(
-            f"{home.house.id}: {len(fixed)} items did not come to rest and are fixed: {', '.join(fixed[:5])}\n"
+        nouns = ("item", "is") if len(fixed) == 1 else ("items", "are")
+        text = (
+            f"{len(fixed)} {nouns[0]} did not come to rest and {nouns[1]} fixed: {', '.join(fixed)}"
         )
+        (folder / REMARKS).write_text(f"{home.house.id}: {text}\n")
 
 
 class _Model:
@@ -78,13 +84,19 @@ class _Model:
         for piece in home.pieces:
             if piece.surfaces or piece.lamps:
                 self._piece(piece)
-        contact = ET.SubElement(self.root, "contact")
+        self._contact = ET.SubElement(self.root, "contact")
+        self._equality = ET.SubElement(self.root, "equality")
         for (a, part_a), (b, part_b) in passing_pairs(home):
             names = {
                 "body1": body_name(home.pieces[a], part_a),
                 "body2": body_name(home.pieces[b], part_b),
             }
-            ET.SubElement(contact, "exclude", names)
+            ET.SubElement(self._contact, "exclude", names)
+
+    def join(self, a: str, b: str) -> None:
+        """Hold two loose bodies together, without contact."""
+        ET.SubElement(self._contact, "exclude", body1=a, body2=b)
+        ET.SubElement(self._equality, "weld", body1=a, body2=b)
 
     def _materials(self) -> None:
         house = self._home.house
@@ -237,8 +249,10 @@ def _settle(model: _Model, path: Path) -> list[str]:
             else:
                 body.set("pos", numbers(pose[:3]))
                 body.set("quat", numbers(pose[3:]))
+        for a, b in rest.joined:
+            model.join(names[a], names[b])
         path.write_bytes(xml_bytes(model.root))
-        if not rest.restless.any():
+        if not rest.restless.any() and not rest.joined:
             break
     return fixed
 
