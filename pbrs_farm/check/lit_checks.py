@@ -38,6 +38,8 @@ _LEAST_ALBEDO = 0.04
 _HALF = 0.5  # of the sun's own light: noise, and colours that albedo's luminance averages
 _LAMP = 0.6  # of a bulb's own light: noise, and clamped bounces
 _LEVEL = 5.0  # ratio of a view's floor to its room's: furniture shades, lamps are near
+_SEEN = 0.1  # share of visible places below which a lamp is hidden from them
+_BOUNCES = 2.0  # arrivals of light at a floor, by walls and ceiling that reflect a half
 _UNEVEN = 4.0  # intensity of a flat lamp that shines down, over that of one that shines evenly
 _LEAST_FLOOR_LX = 1.0  # of a floor, below which noise decides
 _FLOOR_GRID = 40  # points a side, from which the sun is looked for
@@ -109,16 +111,21 @@ class LitScene:
         sizes = {name: np.ptp(bulb.corners, axis=0) for name, bulb in self.lamps.items()}
         return {n: self.lamps[n] for n, s in sizes.items() if s.min() >= _ROUND * s.max()}
 
+    def sees(self, lamp: _Bulb, points: F64) -> Bools:
+        """(N,) level places (N, 3) below a lamp from which its middle, or its shade, is visible."""
+        to = lamp.middle - points
+        face = self.inside.first(points, to)
+        is_it = (face >= 0) & (self.triangles.instance[face] == lamp.instance)
+        return np.asarray(is_it & (to[:, 1] > 0))
+
     def lux_of_lamps(self, points: F64) -> float:
         """Mean lx on level places (N, 3) by the lamps that they see, each a point that shines evenly."""
         total = 0.0
         for lamp in self.lamps.values():
             to = lamp.middle - points
             distance = np.maximum(np.linalg.norm(to, axis=1), 1e-6)
-            face = self.inside.first(points, to)
-            # A lamp's shade does not hide it.
-            free = (face >= 0) & (self.triangles.instance[face] == lamp.instance) & (to[:, 1] > 0)
-            total += float((free * to[:, 1] / distance**3).mean()) * lamp.flux / (4 * math.pi)
+            lit = self.sees(lamp, points) * to[:, 1] / distance**3
+            total += float(lit.mean()) * lamp.flux / (4 * math.pi)
         return total
 
 
@@ -359,17 +366,24 @@ def _check_level(case: ViewCase, places: LitPlaces) -> None:
 
 
 def _lamps_elsewhere(case: ViewCase, room: Mapping[str, Any], seen: F64) -> tuple[float, float]:
-    """Lux by which direct light of lamps to a room's floor may exceed that to visible places, and fall short.
+    """Lux by which lamps may light a room's floor more than its visible places, and less.
 
-    Inner walls may hide a lamp from one of them.
+    Inner walls may hide a lamp. One that the visible places do not see sends its light to the rest of the
+    floor, some of it more than once; one that mostly they see lights them directly.
     """
     scene = case.now.shared(LitScene)
+    x, z = np.array(room["polygon"], np.float64).T
+    area = abs(float(x @ np.roll(z, 1) - z @ np.roll(x, 1))) / 2
     grid = points_in_plan(room["polygon"], _FLOOR_GRID // 2, room["floor_y"] + _FLOOR_M)
     if not len(grid):
         return 0.0, 0.0
-    all_over, here = scene.lux_of_lamps(grid), scene.lux_of_lamps(seen)
-    more = _UNEVEN * (all_over - here)
-    return max(more, 0.0), max(-more, 0.0)
+    hidden = sum(
+        lamp.flux
+        for lamp in scene.lamps.values()
+        if scene.sees(lamp, grid).any() and scene.sees(lamp, seen).mean() < _SEEN
+    )
+    less = _UNEVEN * (scene.lux_of_lamps(seen) - scene.lux_of_lamps(grid))
+    return _BOUNCES * hidden / area, max(less, 0.0)
 
 
 def _check_visible_bulbs(case: ViewCase) -> None:
