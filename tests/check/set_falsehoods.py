@@ -159,10 +159,17 @@ def _other_answer(out: Path) -> None:
 
 
 def _other_phrase(out: Path) -> None:
-    """A phrase of another noun, with its tokens."""
-    file = max(out.glob("forms/questions/views/*/refs.json"), key=lambda f: f.stat().st_size)
-    phrase = {"sent": "the bed", "raw": "the bed", "tokens": ["the", "bed"]}
-    edit_json(file, lambda refs: refs[0]["sentences"][0].update(phrase))
+    """A phrase of another noun for the last annotation."""
+    folder = _one(out, "forms/questions/views/*/refs.json").parent
+    document = json.loads((folder / "instances.json").read_text())
+    row = document["annotations"][-1]
+    names = {image["id"]: image["file_name"] for image in document["images"]}
+    sentence = {"sent_id": 0, "sent": "the bed", "raw": "the bed", "tokens": ["the", "bed"]}
+    ref = {
+        "ref_id": 0, "ann_id": row["id"], "image_id": row["image_id"], "category_id": row["category_id"],
+        "file_name": names[row["image_id"]], "sent_ids": [0], "sentences": [sentence],
+    }  # fmt: skip
+    (folder / "refs.json").write_text(json.dumps([ref]))
 
 
 def _to_the_other_split(out: Path) -> None:
