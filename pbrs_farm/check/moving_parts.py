@@ -61,7 +61,7 @@ class MovingPart:
         """(F, 3, 3) its faces of some area, closed."""
         points = self.moved(self.item.points_of(self.part), -self.joint["value"])
         corners = points.reshape(-1, 3, 3)
-        return corners[trimesh.triangles.area(corners) > _LEAST_M2]
+        return np.asarray(corners[trimesh.triangles.area(corners) > _LEAST_M2])
 
     @cached_property
     def _areas(self) -> F64:
@@ -148,7 +148,8 @@ class MovingPart:
         """(N, 3) points on its faces, closed; the same in each run."""
         rng = np.random.default_rng(0)
         faces = rng.choice(len(self._areas), _POINTS, p=self._areas / self._areas.sum())
-        return np.einsum("nk,nkc->nc", rng.dirichlet([1, 1, 1], _POINTS), self.corners[faces])
+        weights = rng.dirichlet([1, 1, 1], _POINTS)
+        return np.asarray(np.einsum("nk,nkc->nc", weights, self.corners[faces]))
 
     def into_body(self, sign: float) -> float:
         """Share of its points that pass a face of the body at the beginning of a way, 0..1."""

@@ -320,7 +320,7 @@ def _is_all_over(gain: F64, sigmas: float = _TILE_SIGMAS) -> bool:
     The edges of an empty room are a few lines, along which a patch of sun or a shadow may run.
     """
     tiles = tile_means(gain[..., None]).ravel()
-    return float(tiles.mean()) > sigmas * float(tiles.std()) / len(tiles) ** 0.5
+    return bool(tiles.mean() > sigmas * tiles.std() / len(tiles) ** 0.5)
 
 
 def _slopes(

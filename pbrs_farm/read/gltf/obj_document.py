@@ -33,6 +33,7 @@ def gltf_of_mesh(
     rgba: sRGB-encoded colour if it has no materials. Pictures are named from the root of the folder. Raises
     BadHouse as parse_obj and parse_stl do.
     """
+    meshes: tuple[Mesh, ...]
     if name.lower().endswith(".stl"):
         meshes, mtl = (parse_stl(data, name, max_triangles=max_triangles),), {}
     else:

@@ -125,9 +125,9 @@ def companions_of_habitat(given: GivenFile, files: SourceFiles) -> str:
                 settings, name = dataset.template(template, kind) or ({}, "")
                 if name:
                     asset = settings.get("render_asset")
-                    models = [dataset.asset(name, asset)] if asset else []
+                    assets = [dataset.asset(name, asset)] if asset else []
                     names |= {name}.union(
-                        *(files_of_asset(dataset.folder, m, files) for m in models)
+                        *(files_of_asset(dataset.folder, m, files) for m in assets)
                     )
             urdf = dataset.urdf(template)
             if urdf is not None:
