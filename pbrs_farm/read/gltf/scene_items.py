@@ -250,8 +250,8 @@ def _item(
         shining = {k: emission for k, emission in shining.items() if k not in unknown}
     lights += emitted(surfaces, shining)
     item = _finish_item(thing, surfaces, lights, _box_of_thing(thing, parts))
-    part_names = {s.part for s in surfaces}
-    moving = tuple(joint for joint in dict.fromkeys(joints.values()) if joint.part in part_names)
+    shown_parts = {s.part for s in surfaces}
+    moving = tuple(joint for joint in dict.fromkeys(joints.values()) if joint.part in shown_parts)
     return replace(item, joints=moving) if moving else item
 
 
