@@ -8,6 +8,7 @@ from __future__ import annotations
 import itertools
 import json
 import tempfile
+import warnings
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
@@ -111,7 +112,9 @@ def pictured(
         with tempfile.TemporaryDirectory() as name:
             settings = {k.replace("__", "."): v for k, v in words.items()}
             chosen = home(Path(name)).set(**_SMALL | settings)
-            pf.render(chosen, looks or chosen.cameras(n=1), layers=layers).save(root)
+            # A camera in no room is a warning.
+            with warnings.catch_warnings(action="ignore", category=UserWarning):
+                pf.render(chosen, looks or chosen.cameras(n=1), layers=layers).save(root)
 
     return make
 
