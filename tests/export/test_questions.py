@@ -25,7 +25,6 @@ from pbrs_farm.export.questions.clips import Clip, Thing, is_countable
 from pbrs_farm.export.questions.kinds import KINDS, Draft, QuestionKind, bearing_deg
 from pbrs_farm.export.questions.references import references_of
 from tests.sample.sampled_rooms import box, room_house
-from tests.scene.homes import small_home
 
 KIND = {kind.name: kind for kind in KINDS}
 ROOM_M = 8.0
@@ -376,7 +375,7 @@ def test_a_phrase_names_the_colour_of_a_coloured_item(kind, rgb, colour):
 
 @pytest.mark.long
 def test_questions_of_a_real_view_are_right_by_a_checker_that_shares_no_code(tmp_path):
-    home = small_home()
+    home = pf.load("made:2,rooms=1", "preview")
     frames = pf.render(home, home.cameras(n=3), modes=["opengl_dl"], layers=["albedo"])
     frames.save(tmp_path / "root")
     out = tmp_path / "out"

@@ -179,7 +179,7 @@ def poster(
             ]
         case 2:
             z = 0.006
-            clips = [(a * 0.6 * x, b, 0.004) for a in (-1, 1) for b in (0.007, height - 0.007)]
+            clips = [(a * 0.6 * x, b, 0.0045) for a in (-1, 1) for b in (0.007, height - 0.007)]
             half = np.array([0.008, 0.01, 0.0045])
             parts = [
                 (box("clip", np.array(p), half, 0), plain("clip", (0.6, 0.6, 0.6), 0.3))
