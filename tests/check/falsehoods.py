@@ -316,6 +316,16 @@ def eyes_exchanged(view: Path) -> None:
     document("cameras.json", exchange)(view)
 
 
+def camera_of_the_view_moved(view: Path) -> None:
+    """Move the camera of the rendered view in cameras.json, not in view.json."""
+
+    def move(cameras: dict) -> None:
+        row = next(row for row in cameras["views"] if row["id"] == view.name)
+        row["world_from_camera_opengl"][0][3] = 1.0
+
+    document("cameras.json", move)(view)
+
+
 def pictures_of_eyes(view: Path) -> None:
     """Exchange light and developed pictures of the two eyes."""
     right = view.parent / f"{view.name}_right"
@@ -582,7 +592,7 @@ _FINISHED |= {
     "lux of a room": (document("illuminance.json", lambda h: h["rooms"][0].update(indoor_lx=500.0)), "light facts"),
     "a room's warning hidden": (document("illuminance.json", lambda h: h["rooms"][0].update(warnings=["dark"])), "illuminance"),
     "a room lit by another light": (document("illuminance.json", lambda h: h["rooms"][0].update(lit_by=["sky"])), "illuminance"),
-    "camera of cameras.json moved": (document("cameras.json", lambda h: h["views"][5]["world_from_camera_opengl"][0].__setitem__(3, 1.0)), "camera file"),
+    "camera of cameras.json moved": (camera_of_the_view_moved, "camera file"),
     "camera of a view that is not rendered moved": (document("cameras.json", lambda h: h["views"][0]["world_from_camera_opengl"][0].__setitem__(3, 1.0)), "choice"),
     "focal length of a view that is not rendered": (document("cameras.json", lambda h: h["views"][0]["intrinsics"].update(fx=200.0)), "choice"),
     "objects of a view that is not rendered": (document("cameras.json", lambda h: h["views"][0]["objects"].update({"21": 9})), "choice"),
