@@ -774,14 +774,10 @@ _FINISHED |= {
     "light moved by 4 px, developed": (each(lambda a: np.roll(a, 4, 1)), "light edges"),
     "outdoor light mirrored, developed": (each(mirrored, "outdoor"), "light edges"),
     "indoor light mirrored, developed": (each(mirrored, "indoor"), "light edges"),
-    "lamps of ten times the light": (each(scaled(10), "indoor"), "levels"),
-    "lamps of a tenth of the light": (each(scaled(0.1), "indoor"), "lamplight"),
-    "daylight of ten times the light": (each(scaled(10), "outdoor"), "levels"),
     "light of one colour all over": (each(lambda a: np.full_like(a, a.mean())), "light edges"),
     "light with its rows exchanged in pairs": (each(rows_exchanged), "light edges"),
     "light with its columns exchanged in pairs": (each(lambda a: rows_exchanged(a.T).T), "light edges"),
     "light with a darker patch": (each(darker_patch), "light traced"),
-    "outdoor light with a darker patch": (each(darker_patch, "outdoor"), "light traced"),
     "green light doubled": (doubled(".G"), "light traced"),
     "blue light of lamps doubled": (doubled(".B", "indoor"), "light traced"),
     "red daylight doubled": (doubled(".R", "outdoor"), "light traced"),
@@ -806,7 +802,14 @@ _FINISHED |= {
     "projector's dots left out": (picture("projector.png", scaled(0)), "projector"),
 }  # fmt: skip
 
-_LAMPS |= {"layers of two lamps exchanged, and their shares": (exchange_lamps, "lamplight")}
+_LIT_FLOOR: dict[str, tuple[Plant, str]] = {
+    # Powers of two, so that the indoor light stays the exact sum of its lamps.
+    "lamps of eight times the light": (each(scaled(8), "indoor", "lamp"), "levels"),
+    "lamps of an eighth of the light": (each(scaled(0.125), "indoor", "lamp"), "lamplight"),
+    "daylight of ten times the light": (each(scaled(10), "outdoor"), "levels"),
+    "outdoor light with a darker patch": (each(darker_patch, "outdoor"), "light traced"),
+    "layers of two lamps exchanged, and their shares": (exchange_lamps, "lamplight"),
+}
 
 _PAIR |= {"pictures of the eyes exchanged": (pictures_of_eyes, "light guides")}
 
@@ -834,7 +837,7 @@ _LENS: dict[str, tuple[Plant, str]] = {
 
 FALSEHOODS: dict[str, dict[str, tuple[Plant, str]]] = {
     "finished": _FINISHED, "cameras": _CAMERAS, "film": _FILM, "pair": _PAIR, "lamps": _LAMPS, "edited": _EDITED, "opened": _OPENED,
-    "sun": _SUN, "sensor": _SENSOR, "lens": _LENS,
+    "lit floor": _LIT_FLOOR, "sun": _SUN, "sensor": _SENSOR, "lens": _LENS,
 }  # fmt: skip
 
 

@@ -131,6 +131,11 @@ def _lamps_set(_folder: Path) -> pf.Home:
     return small_home().light("floor lamp", lm=900, kelvin=2700).open("door_inner", 0.5)
 
 
+def _bright_lamp(_folder: Path) -> pf.Home:
+    """A floor lamp brighter than the room's other lamp, so that exchanged layers of the two differ."""
+    return small_home().light("floor lamp", lm=6000)
+
+
 def _read(title: str) -> Callable[[Path], pf.Home]:
     return lambda folder: pf.load(every_format()[title](folder), recipe="preview")
 
@@ -190,6 +195,7 @@ ROOTS: dict[str, Make] = {
     "pair": rendered("builtin", {"cameras.stereo_m": "0.065"}, n_views=2),
     "lamps": rendered("builtin", {"light.groups": "lamps", "light.spp": "16"}, layers=("residual_indoor",)),
     "cameras": rendered("builtin", {"light.denoise": "true", "light.spp": "16", "tone.variants": "3"}, layers=("residual",)),
+    "lit floor": pictured(_bright_lamp, _look((3.4, 1.6, 1.6), (1.0, 0.3, 0.9)), layers=(), light__groups="lamps", light__spp=16),
     "sun": sunlit(345.0),
     "sensor": rendered("builtin", {"light.denoise": "true", "tone.camera": "drawn", "tone.variants": "2"}, layers=()),
     "dark": rendered("builtin", {"light.denoise": "true", "light.spp": "8", "sky.time": "night", "tone.camera": "webcam",
