@@ -16,10 +16,7 @@ from pbrs_farm.geometry.outlines import bent, oval, rings
 # fmt: off
 @thing(group="cup")
 def cup(m: Maker) -> None:
-    """A mug.
-
-    A tea cup on its saucer, a small one, a tall one, of enamel, with facets, without a handle.
-    """
+    """A mug, a tea cup on its saucer, a small or tall one, of enamel, with facets, without a handle."""
     form, tall, r, glaze = (m.integers(0, 13), m.uniform(0.078, 0.102), m.uniform(0.036, 0.044),
         m.china())
     with m.of(glaze):
