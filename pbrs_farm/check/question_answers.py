@@ -27,7 +27,7 @@ _ROUNDING_M: Final = 0.05  # of an answer in metres with one decimal
 _SLACK_M: Final = 0.006  # of a distance between points of that spacing
 _NOTICED: Final = 1e-4  # share of a picture's pixels
 _CONE_DEG: Final = 10.0  # least angle of a direction from the border to the next
-# Class -> words of names that are nouns of their own.
+# Class -> words in names for which a question uses a more specific noun.
 _OWN_WORDS: Final = {
     "bag": "suitcase|backpack", "bed": "crib|duvet|mattress", "box": "basket|crate", "cabinet": "wardrobe",
     "chair": "armchair|bench|stool|ottoman|pouf", "curtain": "curtains", "lamp": "candle|candlestick",

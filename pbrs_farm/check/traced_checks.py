@@ -88,7 +88,7 @@ def _shown(case: ViewCase) -> Bools:
 
 
 def _windows(stored: F64, traced: F64, is_whole: Bools, level: float) -> Iterator[_Window]:
-    """The worst window of each size that fits; only blocks (H, W) that are whole count."""
+    """The worst window of each size; is_whole: (H, W), False for blocks to ignore."""
     faint = _FAINT * float(np.median(traced))
     for size in _WINDOWS:
         if size > min(stored.shape):

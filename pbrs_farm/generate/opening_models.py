@@ -284,7 +284,7 @@ def _sashes(
         catches = _catch(x, (low + middle) / 2, (low, high), design.handle)
         hinge, z = (right - 0.016 if k % 2 else left), _SASH_DEPTH_M
         ys = np.linspace(low + 0.15, middle - 0.23, 3 if middle - low > 1.3 else 2).tolist()
-        # Flat hinges: of a closed sash the handle stands out most.
+        # Hinges are flat, so that the handle is the foremost part of a closed sash.
         catches += [((hinge, y, z), (hinge + 0.016, y + 0.08, z + 0.003)) for y in ys]
         yield (left, right), bars, panes, catches
 

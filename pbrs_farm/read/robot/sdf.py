@@ -42,7 +42,7 @@ _GROUND: Final = (
     b'<sdf><model name="ground_plane"><link name="link"><visual name="visual"><geometry><plane>'
     b"<size>100 100</size></plane></geometry></visual></link></model></sdf>"
 )
-_ENDLESS: Final = 1e3  # limits beyond, radians or metres, are none
+_ENDLESS: Final = 1e3  # radians or metres; a wider limit means no limit
 _KINDS: Final = {
     "revolute": JointKind.REVOLUTE,
     "continuous": JointKind.REVOLUTE,

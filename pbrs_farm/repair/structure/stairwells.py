@@ -70,7 +70,7 @@ def _holes(
     ceiling_y = max(r.ceiling_y for r in rooms)
     # Merge the rooms and walls of this level.
     feet = [w.footprint for w in walls if w.bottom_y < ceiling_y - 0.1 and w.high_y > floor_y + 0.1]
-    # A stairwell that the file has as a room of two storeys is none of this level's holes.
+    # A stairwell stored as a room of two storeys is not a hole of this level.
     middle_y = (floor_y + ceiling_y) / 2
     through = [r for r in house.rooms if r.floor_y < middle_y < r.ceiling_y]
     areas = [plan.polygon_of_room(r.polygon) for r in {r.id: r for r in rooms + through}.values()]

@@ -1,4 +1,4 @@
-"""Homes in URDF and SDF: items, rooms, joints, included models, and faults that are notes."""
+"""Homes in URDF and SDF: items, rooms, joints, included models, and notes on faults."""
 
 from __future__ import annotations
 
