@@ -141,6 +141,7 @@ def set_from_bytes(data: bytes, file: str) -> DataSet:
         _form(form, table, names, shares, file) for form, table in tables.get("form", {}).items()
     )
     _check_forms(forms, parts, file)
+    parts = tuple(_stored(part, forms) for part in parts)
     card = SetCard(
         of_card.get("title") or name, of_card.get("text", ""), of_card.get("licence", "")
     )
@@ -242,11 +243,25 @@ def _misfit(form: ViewForm, part: SetPart, choice: Choice) -> str:
         return f"lens.model {lens}: this format supports {', '.join(form.lenses)}"
     if form.layers and layers.isdisjoint(form.layers):
         return f"{form.name} needs a layer of {', '.join(form.layers)}"
-    if part.want.drop_radiance and (form.reads_radiance or "radiance" in (choice.layers or ())):
+    if part.want.drop_radiance and _reads_radiance(form, choice):
         return "the form reads radiance.exr: omit drop_radiance"
     if form.is_of_frames and source_of(part.recipe.cameras).is_sequence is False:
         return f'{form.name} needs frames of sequences (cameras = "walk")'
     return ""
+
+
+def _reads_radiance(form: ViewForm, choice: Choice) -> bool:
+    return form.reads_radiance or "radiance" in (choice.layers or ())
+
+
+def _stored(part: SetPart, forms: Sequence[SetForm]) -> SetPart:
+    """The part, without radiance.exr unless its file asks for it, a form reads it, or it holds lamps one by one."""
+    kinds = [(form_of(f.to), f.choice) for f in forms if not f.packing and part.name in f.parts]
+    is_read = any(isinstance(k, ViewForm) and _reads_radiance(k, choice) for k, choice in kinds)
+    if is_read or part.recipe.light.groups == "lamps" or "drop_radiance" in part.values:
+        return part
+    want = part.want.model_copy(update={"drop_radiance": True})
+    return replace(part, want=want, values={**part.values, "drop_radiance": True})
 
 
 def _form(

@@ -150,8 +150,8 @@ def _is_named(row: Mapping[str, Any], word: str) -> bool:
 
 
 _NO_LIGHT: Final = (
-    "the view has no mode of light, or was rendered with --drop-radiance: render it again into a"
-    " new folder without that"
+    "the view has no mode of light, or was rendered with --drop-radiance, as parts of sets are: render"
+    " it again into a new folder without that (in a set's file: drop_radiance = false)"
 )
 _VIEW: Final = re.compile(
     r"(?P<root>[^:]+://.+)/(?:houses|objects)/(?P<house>[^/]+)/views/(?P<view>[^/]+)/?"

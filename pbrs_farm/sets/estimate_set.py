@@ -87,7 +87,8 @@ class SetEstimate(Record):
     cpu_hours_beside_gpu: float
     gigabytes: float  # 10^9 bytes
     gigabytes_with_radiance: float
-    gigabytes_without_radiance: float  # of parts with `drop_radiance`
+    gigabytes_without_radiance: float
+    radiance_kept: tuple[str, ...]  # parts without `drop_radiance`
     files: int  # of the parts
     parts: Mapping[str, Mapping[str, int | float]]
     clouds: tuple[CloudCost, ...]
@@ -142,6 +143,11 @@ def estimate_set(data_set: DataSet) -> SetEstimate:
         gigabytes=round(n_bytes / 1e9, 2),
         gigabytes_with_radiance=round((n_bytes + dropped) / 1e9, 2),
         gigabytes_without_radiance=round((n_bytes + dropped - whole.n_radiance_bytes) / 1e9, 2),
+        radiance_kept=tuple(
+            part.name
+            for part in data_set.parts
+            if not part.want.drop_radiance and costs[part.name].n_radiance_bytes
+        ),
         files=round(whole.n_files),
         parts=parts,
         clouds=tuple(_on_cloud(name, of, whole, n_bytes) for name, of in prices().items()),
@@ -241,7 +247,7 @@ def estimate_text(estimate: SetEstimate) -> str:
         for c in e.clouds
     ]
     light = f"With light on an H100: {e.gpu_hours:,} GPU hours and {e.cpu_hours_beside_gpu:,} CPU hours."
-    size = f"radiance.exr: {e.gigabytes_with_radiance:,} GB with it, {e.gigabytes_without_radiance:,} without (drop_radiance)."
+    size = f"radiance.exr: {e.gigabytes_with_radiance:,} GB with it, {e.gigabytes_without_radiance:,} without. Parts that keep it: {', '.join(e.radiance_kept) or 'none'} (drop_radiance)."
     return "\n".join([_text_of(sizes, rows), size, light, "", _text_of(costs, on_clouds)])
 
 

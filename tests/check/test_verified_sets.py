@@ -50,7 +50,7 @@ def test_a_set_without_its_light_is_clean(
     tmp_path: Path, capsys: pytest.CaptureFixture[str]
 ) -> None:
     file, out = small_set(tmp_path / "in"), tmp_path / "out"
-    text = file.read_text().replace('["opengl_dl"]', '["mlt_il_ol"]\ndrop_radiance = true')
+    text = file.read_text().replace('["opengl_dl"]', '["mlt_il_ol"]')
     file.write_text(text.replace("set = [", 'set = [\n  "light.spp=2",', 1))
     assert main(["make", str(file), "--out", str(out)]) == 0
     assert list(out.rglob("mlt_il_ol.png"))

@@ -48,9 +48,10 @@ def test_light_is_samples_times_the_cost_of_one() -> None:
 
 
 def test_dropped_light_counts_beside_the_sum(capsys: pytest.CaptureFixture[str]) -> None:
-    stored = estimate_set(set_from_bytes(of().encode(), "a.toml"))
-    text = of().replace("[part", "drop_radiance = true\n[part", 1)
-    dropped = estimate_set(set_from_bytes(text.encode(), "a.toml"))
+    dropped = estimate_set(set_from_bytes(of().encode(), "a.toml"))
+    text = of().replace("[part", "drop_radiance = false\n[part", 1)
+    stored = estimate_set(set_from_bytes(text.encode(), "a.toml"))
+    assert (stored.radiance_kept, dropped.radiance_kept) == (("views",), ())
     radiance = 3_000 * 500_000 * measured()["radiance_bytes"] / 1e9
     assert stored.gigabytes - dropped.gigabytes == pytest.approx(radiance, abs=0.02)
     assert stored.files - dropped.files == 3_000

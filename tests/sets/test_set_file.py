@@ -54,6 +54,24 @@ def test_a_part_has_the_options_of_all_parts_and_separate_ones() -> None:
     assert (form.name, form.to, form.parts) == ("yolo-depth", "yolo-depth", ("views",))
 
 
+@pytest.mark.parametrize(
+    ("old", "new", "dropping"),
+    [
+        ("", "", ["views", "walks"]),
+        ("frames = 12", "frames = 12\ndrop_radiance = false", ["views"]),
+        ("[form.yolo-depth]", "[form.hypersim]", ["walks"]),
+        ('parts = ["views"]', 'layers = ["depth_z", "radiance"]', []),
+        ("light.spp=9", "light.groups=lamps", ["walks"]),
+    ],
+)
+def test_a_part_stores_radiance_only_if_it_is_asked_for_or_read(
+    old: str, new: str, dropping: list[str]
+) -> None:
+    parts = set_from_bytes(TEXT.replace(old, new).encode(), "rooms.toml").parts
+    assert [part.name for part in parts if part.want.drop_radiance] == dropping
+    assert [part.name for part in parts if options_given(part).get("drop_radiance")] == dropping
+
+
 def test_shards_hold_each_home_once() -> None:
     (views, _walks) = set_from_bytes(TEXT.encode(), "rooms.toml").parts
     shards = [views.homes_of(shard_from_text(f"{k}/4")) for k in range(1, 5)]
