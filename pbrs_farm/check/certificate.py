@@ -67,11 +67,7 @@ class Certificate(Record):
         return "CLEAN" if self.is_clean else "NOT CLEAN"
 
     def text(self) -> str:
-        """The certificate as lines for a terminal.
-
-        A table of all checks, the files with and without checks, the listed failures, and the verdict as
-        the last line, which scripts may look for.
-        """
+        """The certificate as lines for a terminal; the last line is the verdict, for scripts."""
         pixels = "every pixel" if self.all_pixels else "a sample of pixels"
         lines = [
             f"{self.folder}: {self.n_houses} houses, {self.n_views} views, {pixels}",
@@ -120,29 +116,18 @@ class Tally:
         self._coincident: dict[tuple[str, str, str], int] = {}  # house and two items -> pixels
 
     def add(self, check: str, checked: int, *, ties: int = 0) -> None:
-        """Count more pixels, files or facts as checked, and some of these as ties.
-
-        Ties have two right answers. Failures are reported by `fail`, after adding: it does not count
-        them as checked.
-        """
+        """Count pixels, files or facts as checked, and some of them as ties; failures are reported by `fail`."""
         row = self._counts.setdefault(check, [0, 0, 0])
         row[0] += int(checked)
         row[2] += int(ties)
 
     def coincide(self, house: str, items: tuple[str, str]) -> None:
-        """Count a pixel that shows either of two coincident surfaces of these items, in any order.
-
-        The certificate lists such pixels; they are no failures.
-        """
+        """Count a pixel that shows either of two coincident surfaces of these items; it is no failure."""
         a, b = sorted(shown(item) for item in items)
         self._coincident[house, a, b] = self._coincident.get((house, a, b), 0) + 1
 
     def fail(self, check: str, place: str, fault: str, n_failed: int = 1) -> None:
-        """Count failures among the checked pixels, files or facts.
-
-        Of each check only the first MAX_LISTED are listed with their place. Text from files is made
-        printable here.
-        """
+        """Count failures; the first MAX_LISTED of a check are listed with their place, made printable."""
         self._counts.setdefault(check, [0, 0, 0])[1] += int(n_failed)
         listed = self._listed.setdefault(check, [])
         if len(listed) < MAX_LISTED:
@@ -158,10 +143,7 @@ class Tally:
         self.notes.append(shown(text, MAX_MESSAGE))
 
     def expect(self, check: str, place: str, holds: bool | np.bool_, fault: str) -> bool:
-        """Count a fact, which fails with a text unless it holds.
-
-        Returns holds, so that a check can stop where nothing else makes sense.
-        """
+        """Count a fact, which fails with a text unless it holds; returns whether it holds."""
         self.add(check, 1)
         if not holds:
             self.fail(check, place, fault)

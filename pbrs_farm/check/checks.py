@@ -1,7 +1,4 @@
-"""The table of checks: every module `*_checks.py` of this package ends with its entries, `CHECKS = (Check(...), ...)`.
-
-Effects: imports these modules when the table is first asked for. `verify` walks it; nothing else knows a check.
-"""
+"""The table of checks: each module `*_checks.py` of this package, imported at first use, ends with its `CHECKS`."""
 
 from __future__ import annotations
 

@@ -18,11 +18,7 @@ _TILES = 8  # of a picture, across and down
 
 
 def check_darkness(case: ViewCase) -> None:
-    """A picture fails if all light together leaves it black; a dark room is noted.
-
-    A black picture shows nothing, so nobody can want it. A room below 1 lx may be a fact of the
-    house: its labels and its light are right.
-    """
+    """A picture fails if all light together leaves it black; a room below 1 lx is noted."""
     hit = case.arrays["valid"] > 0
     if has_channels(case.light, hit.shape, "outdoor indoor") and hit.any():
         planes = [np.nan_to_num(luminance_of(case.light, g)) for g in ("outdoor", "indoor")]

@@ -1,7 +1,4 @@
-"""Light of radiance.exr, denoised again where the recipe says. Effects: loads the denoiser.
-
-Only the denoiser is the same program as that of the stages: no other gives its values.
-"""
+"""Light of radiance.exr, denoised again by the stages' denoiser where the recipe says; loads the denoiser."""
 
 from __future__ import annotations
 
@@ -22,10 +19,7 @@ Planes = dict[str, F32]  # outdoor, indoor, albedo and normal, each (H, W, 3)
 def stored_light(
     view: StoredView, channels: Channels, is_halved: bool, tally: Tally
 ) -> Planes | None:
-    """Light groups, albedo and normal, light as of `denoised_light`; None if a channel is missing.
-
-    is_halved: at half the picture's size.
-    """
+    """Light groups (at half size if is_halved), albedo and normal; None if a channel is missing."""
     names = {g: [f"{g}.{c}" for c in "RGB"] for g in ("outdoor", "indoor", "albedo")}
     names["normal"] = [f"normal.{c}" for c in "XYZ"]
     if not all(n in channels for row in names.values() for n in row):

@@ -1,7 +1,4 @@
-"""From light to a picture: glare, white balance, exposure, tone and sensor; no effects.
-
-Formulas are written again here from docs/light.md and the sources named; the stages' code is not used.
-"""
+"""From light to a picture by the formulas of docs/light.md, without the stages' code; no effects."""
 
 from __future__ import annotations
 

@@ -33,10 +33,7 @@ class _Sides(NamedTuple):
 
 
 def check_typed_boundaries(case: ViewCase) -> None:
-    """Judge boundary_occlusion and boundary_crease over the whole picture.
-
-    A pixel is right if a rule that rounding does not affect says so, or if rounding leaves it open.
-    """
+    """Judge boundary_occlusion and boundary_crease; a pixel that rounding may change is right either way."""
     view, arrays = case.view, case.arrays
     height, width = view.size
     rays = view.ray_grid() @ view.world_from_camera[:3, :3]

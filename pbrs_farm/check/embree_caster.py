@@ -1,8 +1,4 @@
-"""An independent ray caster: embreex through trimesh over the triangles of house.glb.
-
-Effects: holds an Embree scene. Embree finds the triangle; distance and normal are then computed
-in double precision.
-"""
+"""An independent ray caster: Embree finds the triangle, float64 its distance and normal; holds an Embree scene."""
 
 from __future__ import annotations
 

@@ -1,8 +1,4 @@
-"""Facts of view.json against the files that repeat them: house.json, cameras.json, illuminance.json, recipe, markers.
-
-Effects: reads files. Casts no ray: names, classes, poses, corners of rooms, facts of light. A missing
-document is not compared.
-"""
+"""Facts of view.json against the files that repeat them, if present; reads files, casts no ray."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The check of each field of a root's JSON files: the table fields.csv against the stored files.
-
-Effects: reads files. A field without a row is listed by its name, so that no field is overlooked.
-"""
+"""The check of each field of a root's JSON files, by fields.csv; lists fields without a row. Reads files."""
 
 from __future__ import annotations
 

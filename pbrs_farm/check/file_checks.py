@@ -22,11 +22,7 @@ from pbrs_farm.core import keys
 
 
 def unfinished_houses(root: Path, houses: Sequence[Path]) -> dict[str, str]:
-    """House that a run still renders -> "house: 3 of 12 views are finished".
-
-    A run writes the manifest of a house after its last view. A house that the root's manifest lists was
-    finished.
-    """
+    """House that a run still renders (it has no manifest yet) -> "house: 3 of 12 views are finished"."""
     try:
         listed = stored_bytes(root / "manifest.jsonl")
     except BadFile:
@@ -47,10 +43,7 @@ def unfinished_houses(root: Path, houses: Sequence[Path]) -> dict[str, str]:
 
 
 def check_files(case: RootCase) -> None:
-    """Compare a house's manifest.jsonl with the files on disk and with the done markers.
-
-    A file below views/ that no row lists fails as well.
-    """
+    """Compare a house's manifest.jsonl with the done markers and with every file below views/."""
     root, (house,), tally = case.root, case.houses, case.tally
     if unfinished_houses(root, (house,)):
         return
@@ -147,10 +140,7 @@ def _check_markers(house: Path, rows: dict[str, dict[str, Any]], tally: Tally) -
 
 
 def check_credits(case: RootCase) -> None:
-    """ATTRIBUTION.txt names each work of a dress.json that requires a credit, with its licence.
-
-    A root whose homes require none needs no such file.
-    """
+    """ATTRIBUTION.txt names each work of a dress.json that requires a credit, with its licence."""
     lines: dict[str, str] = {}
     houses = [StoredHouse(folder) for folder in case.houses]
     for house in houses:

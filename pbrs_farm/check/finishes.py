@@ -1,7 +1,4 @@
-"""Gloss of surfaces by house.json: roughness, reflectance at normal incidence, metal; no effects.
-
-Formulas are written again here from docs/formats/pixels.md and the sources it names; the stages' code is not used.
-"""
+"""Gloss of surfaces by the formulas of docs/formats/pixels.md, without the stages' code; no effects."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Points of a view followed into its partner's picture; no effects.
-
-Rays are Embree's, points and cameras those of view.json.
-"""
+"""Points of a view followed into its partner's picture, by Embree and view.json's cameras; no effects."""
 
 from __future__ import annotations
 
@@ -42,10 +39,7 @@ class OtherView:
 
     @staticmethod
     def of(view: StoredView, relation: str) -> OtherView | None:
-        """The partner of that relation in view.json, None without one.
-
-        Its size and lens are those of the view. KeyError or ValueError for a damaged row.
-        """
+        """The partner of that relation in view.json, or None; KeyError or ValueError for a damaged row."""
         row = view.table.get("partners", {}).get(relation)
         if row is None:
             return None
@@ -111,10 +105,7 @@ def follow_points(
 def near_edge(
     view: StoredView, other: OtherView, pixels: Pixels, z: F64, rays: Hits, carry: Carry = stay
 ) -> Bools:
-    """(N,) True if another state is right, too: on the other picture's border, or beside an obstacle.
-
-    Only for points whose stored state differs from `follow_points`: it casts rays five times.
-    """
+    """(N,) True near the other picture's border or an obstacle, where another state is right, too; five casts."""
     rows, columns = pixels
     points, _px, margin = _points_of(view, other, pixels, z, carry)
     is_tie = np.asarray(np.abs(margin) <= BORDER_PX, bool)

@@ -1,7 +1,4 @@
-"""Forms of a set against the files of its parts: views, pictures, depth, boxes, masks, classes, cameras.
-
-Effects: reads files. set_fields.csv lists the files of each check.
-"""
+"""Forms of a set against the files of its parts; set_fields.csv lists the files of each check. Reads files."""
 
 from __future__ import annotations
 

@@ -25,10 +25,7 @@ _ACROSS = 1e-3  # tolerance of the cosine between an opening's normal and its si
 
 
 def check_house(case: HouseCase) -> None:
-    """Judge house.json against house.glb, repair.json and itself.
-
-    Nothing is judged if house.json is missing: the checks of files report that.
-    """
+    """Judge house.json, unless it is missing, against house.glb, repair.json and itself."""
     house, document = case.house, json_of_glb(case.glb)
     if not house.house:
         return

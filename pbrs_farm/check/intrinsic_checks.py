@@ -1,7 +1,4 @@
-"""Shading and residual against albedo, radiance.exr and materials. Effects: none.
-
-Formulas are written again here from docs/formats/layer_rules.md; the stages' code is not used.
-"""
+"""Shading and residual against albedo, light and materials, by docs/formats/layer_rules.md; no effects."""
 
 from __future__ import annotations
 
@@ -171,10 +168,7 @@ def _check_shading(judge: _Judge, raw: Mapping[str, F64]) -> None:
 
 
 def _check_surfaces(case: ViewCase, raw: Mapping[str, F64], *, noise: float) -> None:
-    """Mirrors and glass have no shading, matte surfaces no residual.
-
-    At pixels amid one surface, by independent rays. noise: of denoised light.
-    """
+    """Mirrors and glass have no shading, matte surfaces no residual, at pixels amid one surface."""
     view, arrays, triangles = case.view, case.arrays, case.now.triangles
     if view.recipe is None or view.recipe.materials.preset != "physical":
         return

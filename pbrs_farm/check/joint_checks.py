@@ -1,7 +1,4 @@
-"""Joints of house.json against house.glb and joints.csv, and a view's articulation.json.
-
-Effects: reads documents and the table.
-"""
+"""Joints of house.json against house.glb and joints.csv, and a view's articulation.json; reads files."""
 
 from __future__ import annotations
 

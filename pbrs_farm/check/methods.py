@@ -1,7 +1,4 @@
-"""The method by which `verify` recomputes each file of a root, and the files that it does not recompute; no effects.
-
-A file without a row is compared with its hash and, if it is a layer, its size and type.
-"""
+"""How `verify` recomputes each file of a root; one without a row is compared by hash, size and type. No effects."""
 
 from __future__ import annotations
 
@@ -48,11 +45,7 @@ def how_of_files() -> dict[str, str]:
 
 
 def looked_at(views: list[StoredView], fields: Counter[tuple[str, str]]) -> tuple[str, ...]:
-    """A line for each kind of recomputed file: its name, the number of views, the method.
-
-    Then the number of kinds of fields of each JSON file that have a check (fields: as of
-    `fields.stored_fields`).
-    """
+    """A line for each kind of recomputed file, then how many kinds of fields of each JSON file are checked."""
     counts, how_of = _file_counts(views), how_of_files()
     files = tuple(f"{file} ({counts[file]}): {how}" for file, how in how_of.items() if counts[file])
     return (*files, *field_lines(fields)[0])

@@ -27,11 +27,7 @@ class _Path(NamedTuple):
 
 
 class MirrorRays:
-    """First hits of an eye's rays among all triangles, through every mirror on the way.
-
-    Distances are the whole way, normals those of the image in the mirror: a picture cannot
-    distinguish it from the view out of a window.
-    """
+    """First hits of an eye's rays, through mirrors: distances of the whole way, normals of the image."""
 
     def __init__(self, triangles: Triangles, rays: Rays, eye: F64) -> None:
         """rays: of all triangles."""

@@ -1,8 +1,4 @@
-"""Flow, disparity and occlusion against points followed from one stored view to another.
-
-Effects: none. A pixel with another depth than its ray's (an edge that two casters see differently) is left to the
-checks of that layer.
-"""
+"""Flow, disparity and occlusion against points followed from one stored view to another; no effects."""
 
 from __future__ import annotations
 
@@ -143,19 +139,13 @@ def _judge_motion(name: str, values: F64, followed: Followed) -> tuple[Bools, Bo
 
 
 def half_step(values: F64) -> F64:
-    """Half the distance between 16-bit floats next to values: the error of storing them.
-
-    NaN for values beyond the range of 16-bit floats.
-    """
+    """Half the distance between 16-bit floats next to values (their error); NaN beyond the range."""
     with np.errstate(over="ignore", invalid="ignore"):
         return np.asarray(np.spacing(np.abs(values).astype(np.float16)).astype(np.float64) / 2)
 
 
 def check_partners(case: HouseCase) -> None:
-    """Each partner that the folder has, too, has the pose, K and time in the view's table.
-
-    Its name follows from the view's own. A view may be rendered alone.
-    """
+    """Each stored partner has the pose, K and time in the view's table, and a name that follows from it."""
     views = {v.view.folder.name: v.view for v in case.views}
     for view in views.values():
         for relation, row in sorted(view.table.get("partners", {}).items()):

@@ -1,8 +1,4 @@
-"""A stored house at another time, moved as house.json's motions say; no effects.
-
-Shares no code with the stages: keyframes are interpolated by numpy and scipy, and triangles of house.glb rotate about
-the joints' axes.
-"""
+"""A stored house at another time, moved by house.json's motions without the stages' code; no effects."""
 
 from __future__ import annotations
 

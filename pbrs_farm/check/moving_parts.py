@@ -1,7 +1,4 @@
-"""Parts that joints move, closed, along the axes of their item's box; no effects.
-
-Nothing here is taken from the code that makes joints: hinges, ways and masses follow from triangles of house.glb.
-"""
+"""Parts that joints move, closed, in the axes of their item's box, from house.glb alone; no effects."""
 
 from __future__ import annotations
 
@@ -212,10 +209,7 @@ class MovingPart:
 def mass_kg(
     item: Triangles, part: Bools, materials: Sequence[Mapping[str, Any]], only: int
 ) -> float:
-    """Mass of some triangles of an item, by the table of constructions.
-
-    materials: rows of house.json. only: the item's class if it suggests the material, else 0.
-    """
+    """Mass of triangles of an item, by the table of constructions; only: the class's material, else 0."""
     total = 0.0
     for surface in np.unique(item.surface[part]):
         chosen = part & (item.surface == surface)

@@ -1,7 +1,4 @@
-"""pairs.parquet against points followed from one stored camera to the other, by Embree.
-
-Effects: reads files.
-"""
+"""pairs.parquet against points followed by Embree from one stored camera to the other; reads files."""
 
 from __future__ import annotations
 
@@ -29,11 +26,7 @@ _COLUMNS = ("room", "view_a", "view_b", "a_in_b", "b_in_a", "common", "baseline_
 
 
 def check_pairs(case: HouseCase) -> None:
-    """Recompute the shares of some pairs, and the other columns of all.
-
-    At most _MOST_PAIRS, drawn by the house's name, so the same each time. A file that cannot be
-    read is a failure.
-    """
+    """Recompute the shares of at most _MOST_PAIRS pairs, drawn by the house's name, and all other columns."""
     # Loads slowly, and few homes have the file.
     import pyarrow as pa
     import pyarrow.parquet as pq

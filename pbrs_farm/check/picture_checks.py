@@ -1,7 +1,4 @@
-"""Edges of OpenGL pictures against those of labels, and histograms. Effects: reads files.
-
-Formulas are written again here from docs/formats/layer_rules.md and the sources named.
-"""
+"""Edges of OpenGL pictures against those of labels, and histograms, by docs/formats/layer_rules.md; reads files."""
 
 from __future__ import annotations
 
@@ -27,11 +24,7 @@ _MOVES = {
 
 
 def check_edges(case: ViewCase) -> None:
-    """The edges of OpenGL pictures fit those of the instances, and no moved copy of them fits better.
-
-    Copies are mirrored, turned and shifted: this finds pictures of another camera, not small errors.
-    A view with few edges is noted and not counted.
-    """
+    """The edges of OpenGL pictures fit the instances better than any mirrored, turned or shifted copy does."""
     outline = _outline(case.arrays["instance"])
     for mode in ("opengl_dl", "opengl_il"):
         if mode not in case.arrays:
@@ -89,10 +82,7 @@ def _fit(outline: Bools, edges: F64) -> float:
 
 
 def check_histogram(case: ViewCase) -> None:
-    """Count the view's histograms and quality numbers again.
-
-    Each number of the file is expected separately, so that the certificate names the wrong one.
-    """
+    """Count the view's histograms and quality numbers again, each expected separately."""
     place = f"{case.place}/histogram.json"
     try:
         stored = stored_object(case.view.folder / "histogram.json")

@@ -116,11 +116,7 @@ def _note_glitter(case: ViewCase, verdict: PixelVerdict) -> None:
 
 
 def judge_pixels(view: StoredView, labels: Labels, pixels: Pixels, scene: Scene) -> PixelVerdict:
-    """Compare labels at N pixels with rays through the scene.
-
-    labels: layer -> (N,) or (N, 3) stored values, of RAY_LAYERS. Rays beside a pixel and coincident
-    surfaces are tried where its own ray does not explain the stored values.
-    """
+    """Compare stored values of RAY_LAYERS at N pixels with rays through the scene."""
     rays, (rows, columns) = scene.rays, pixels
     origin, directions = view.rays(rows, columns)
     first = rays.first(origin, directions)
@@ -316,10 +312,7 @@ def _part_is_right(stored: NDArray[Any], hits: _Hits) -> Bools:
 def normal_is_right(
     stored: NDArray[Any], expected: F64, tolerance_deg: float = _NORMAL_DEG
 ) -> Bools:
-    """(N,) stored 16-bit normals (N, 3) decode to the expected ones; where those are 0, to nothing.
-
-    expected: (N, 3) of unit length or 0.
-    """
+    """(N,) stored 16-bit normals (N, 3) decode to the expected unit vectors; where those are 0, to nothing."""
     # The sine is more accurate than the cosine for small angles.
     normals = stored_normals(stored)
     length = np.linalg.norm(normals, axis=1)
@@ -331,10 +324,7 @@ def normal_is_right(
 
 
 def _coincident(labels: Labels, face: I64, origin: F64, directions: F64, scene: Scene) -> I64:
-    """(N,) another triangle of the stored instance that the ray pierces at the first hit's depth, or -1.
-
-    A model may have a face twice, with other texture coordinates.
-    """
+    """(N,) another triangle of the stored instance pierced at the first hit's depth (a doubled face), or -1."""
     if "instance" not in labels:
         return np.full(len(face), -1, np.int64)
 
@@ -350,10 +340,7 @@ def _coincident(labels: Labels, face: I64, origin: F64, directions: F64, scene: 
 
 
 def of_another_colour(face: I64, origin: F64, directions: F64, scene: Scene) -> I64:
-    """(N,) a triangle of another material that each ray pierces where it meets face, or -1.
-
-    Either is right for a label that they share; the picture shows one or the other and glitters.
-    """
+    """(N,) a coincident triangle of another material (the picture shows either), or -1."""
     triangles = scene.triangles
     planes = _number_planes(triangles.vertices.astype(np.float64)[triangles.faces])
     order = np.argsort(planes, kind="stable")
@@ -368,10 +355,7 @@ def of_another_colour(face: I64, origin: F64, directions: F64, scene: Scene) -> 
 
 
 def of_another_part(face: I64, origin: F64, directions: F64, scene: Scene) -> I64:
-    """(N,) a triangle of another item or part that each ray pierces where it meets face, or -1.
-
-    Where a leaf and its frame cross at one depth, either may be visible.
-    """
+    """(N,) a coincident triangle of another item or part, as where a leaf crosses its frame, or -1."""
     triangles, rays = scene
     corners = triangles.vertices.astype(np.float64)[triangles.faces]
     low, high = corners.min(1) - _TIE_M, corners.max(1) + _TIE_M

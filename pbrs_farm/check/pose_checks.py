@@ -23,11 +23,7 @@ _MAX_PARTNERS = 40  # views that a view is compared with
 
 
 def check_pose(case: ViewCase) -> None:
-    """The pose is rigid, both conventions agree, and K is a pinhole's.
-
-    K must have positive focal lengths and a principal point within the picture. After wrong shapes
-    nothing else of the pose is judged.
-    """
+    """The pose is rigid, both conventions agree, and K has a focal length and a centre within the picture."""
     view, expect = case.view, case.expect("pose")
     opencv, k = view.world_from_camera, view.k
     opengl = np.array(view.table["world_from_camera_opengl"], np.float64)
@@ -69,10 +65,7 @@ def check_reprojection(case: HouseCase) -> None:
 
 
 def _points_of(seen: SeenView) -> F64:
-    """(N, 3, 3) world positions, normals and eye of a grid of the view's pixels.
-
-    Only pixels amid a flat patch of 5 x 5: narrower surfaces may be narrower than a pixel elsewhere.
-    """
+    """(N, 3, 3) world position, normal and eye of a grid of pixels amid flat patches of 5 x 5."""
     view, (height, width) = seen.view, seen.view.size
     grid = np.mgrid[_STEP_PX // 2 : height : _STEP_PX, _STEP_PX // 2 : width : _STEP_PX]
     rows, columns = (g.reshape(-1) for g in grid)

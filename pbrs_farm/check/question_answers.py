@@ -67,10 +67,7 @@ class _Home:
 
 
 def _points_on(triangles: Array) -> Array:
-    """(N, 3) corners of (M, 3, 3) triangles, halved until no edge is longer than 2 _SPACING_M.
-
-    The longest edge is halved, so that a long thin triangle only gets points along it.
-    """
+    """(N, 3) corners of (M, 3, 3) triangles, whose longest edges are halved down to 2 _SPACING_M."""
     done = []
     while len(triangles):
         edges = np.linalg.norm(triangles - np.roll(triangles, -1, axis=1), axis=2)

@@ -70,11 +70,7 @@ def check_radiance(case: ViewCase) -> None:
 
 
 def check_guides(case: ViewCase) -> None:
-    """The guides in radiance.exr, mean albedo and normal, are those of the visible surfaces.
-
-    Of a sample of pixels, only those amid one surface count. Glass, mirrors and varnished items are
-    left out: their guides contain reflections.
-    """
+    """Mean albedo and normal of radiance.exr, amid matte surfaces, are those of the visible surfaces."""
     view, channels, house = case.view, case.light, case.house
     if not has_channels(channels, view.size, "albedo", "normal"):
         return
@@ -122,10 +118,7 @@ def check_guides(case: ViewCase) -> None:
 
 
 def matte_items(house: StoredHouse) -> list[int]:
-    """Instances of the home, without the outdoors, whose guides hold only their albedo.
-
-    The guide of a varnished item contains its reflections, too.
-    """
+    """Instances of the home whose guides hold only their albedo: without the outdoors and varnished items."""
     colours = [material["specular"] or (0.0,) for material in house.house["materials"]]
     return [
         n
@@ -236,11 +229,7 @@ def _logs(light: NDArray[Any]) -> NDArray[Any]:
 
 
 def _check_exchanged(case: ViewCase, level: dict[str, NDArray[Any]], bright: Bools) -> None:
-    """Steps of light within pairs of rows, and of columns, do not run against those of albedo.
-
-    Both pairings of neighbours are judged, by the slope of a regression and its error where noise
-    differs from place to place (White 1980).
-    """
+    """Steps of light between adjacent rows or columns do not run against those of albedo (White 1980)."""
     total = level["outdoor"] + level["indoor"]
     if not (total > 0).any():
         return
@@ -315,10 +304,7 @@ def _products(steps: list[F64], others: list[F64]) -> F64:
 
 
 def _is_all_over(gain: F64, sigmas: float = _TILE_SIGMAS) -> bool:
-    """True if a gain (H, W) is that of most tiles, not of a few lines only.
-
-    The edges of an empty room are a few lines, along which a patch of sun or a shadow may run.
-    """
+    """True if a gain (H, W) is that of most tiles, not of a few lines such as the edge of a shadow."""
     tiles = tile_means(gain[..., None]).ravel()
     return bool(tiles.mean() > sigmas * tiles.std() / len(tiles) ** 0.5)
 

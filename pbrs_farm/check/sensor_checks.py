@@ -44,10 +44,7 @@ _REACH_PX = 7  # size of the neighbourhood that a pixel may have measured
 
 
 def check_derived(case: ViewCase) -> None:
-    """Judge hha and the depth sensors, where the view has them.
-
-    Random noise is judged by the range of a pixel's neighbours, and by the mean over flat surfaces.
-    """
+    """Judge hha by its formula, noisy depth by its neighbours' range and its mean over flat surfaces."""
     if "hha" in case.arrays:
         _check_hha(case)
     for name in _MATCHING:
@@ -152,10 +149,7 @@ def _extremes(values: F64) -> tuple[F64, F64]:
 def _check_statistics(
     case: ViewCase, name: str, error: F64, measured: Bools, is_flat: Bools
 ) -> None:
-    """Over flat surfaces, most pixels are measured, the mean error is near 0, and noise is as expected.
-
-    error: (H, W) in standard deviations. Too few flat pixels are not judged.
-    """
+    """Flat surfaces have mostly measured pixels, a mean error near 0 and the expected noise (error: in sigmas)."""
     n = int(is_flat.sum())
     if n < _FEW:
         return

@@ -11,10 +11,7 @@ _LEAST_Z = 0.1  # least slope of a map's unit normal: a steeper one is noise of 
 
 
 def between_corners(weights: F64, normals: F32, facing: F64) -> F64:
-    """(N, 3) unit normals, interpolated between the corners' (N, 3, 3), on the side of facing.
-
-    Equal to facing if the corners have no normals or these cancel out.
-    """
+    """(N, 3) unit normals interpolated from the corners' (N, 3, 3), towards facing; facing without normals."""
     mean = np.einsum("nk,nkc->nc", weights, normals.astype(np.float64))
     length = np.linalg.norm(mean, axis=1, keepdims=True)
     smooth = np.where(length > 1e-6, mean / np.maximum(length, 1e-12), facing)

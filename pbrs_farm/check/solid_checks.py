@@ -127,10 +127,7 @@ def _share_of_floor(room: Mapping[str, Any], rays: Rays) -> float:
 
 
 def check_models(case: HouseCase) -> None:
-    """Poses of placed models are rigid, and bring instances of one model to the same points.
-
-    The origin of a model with one instance cannot be recomputed: the certificate lists it.
-    """
+    """Poses of placed models are rigid, and bring all instances of a model to the same points."""
     first: dict[str, tuple[str, F64]] = {}
     several = set[str]()
     for instance, row in sorted(case.house.items.items()):

@@ -1,7 +1,4 @@
-"""Bytes, digests and JSON of stored files, which may come from a stranger. Effects: reads files.
-
-Every fault is a BadFile whose text gives the reason.
-"""
+"""Bytes, digests and JSON of stored files, which may be a stranger's; every fault is a BadFile. Reads files."""
 
 from __future__ import annotations
 

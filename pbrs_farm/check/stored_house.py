@@ -1,7 +1,4 @@
-"""The documents and markers of a house's folder. Effects: reads files.
-
-Uses no House. A missing or damaged document is empty here: the checks of files report that.
-"""
+"""The documents and markers of a house's folder, empty where missing or damaged; reads files, uses no House."""
 
 from __future__ import annotations
 
@@ -70,10 +67,7 @@ class StoredHouse:
 
     @cached_property
     def lamps(self) -> dict[str, tuple[int, int]]:
-        """Name of each light -> instance of its item and number among the item's lights.
-
-        A single light has the id of its item; several have a slash and their number behind it.
-        """
+        """Name of each light (its item's id, `/n` behind it if it has several) -> instance and number."""
         return {
             f"{row['id']}/{k}" if len(row["lights"]) > 1 else row["id"]: (instance, k)
             for instance, row in sorted(self.items.items())

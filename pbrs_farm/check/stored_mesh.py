@@ -1,7 +1,4 @@
-"""Triangles of house.glb with instance, class, material and texture; no effects.
-
-Shares no code with the package's own reader and writer of GLB on purpose: it checks them.
-"""
+"""Triangles of house.glb, read without the package's own GLB code, which this checks; no effects."""
 
 from __future__ import annotations
 
@@ -47,10 +44,7 @@ class Materials:
     roughness: Textures
 
     def colour(self, material: I64, uv: F64, most: float) -> F64:
-        """(N, 3) sRGB 0..255 of colour times texture at uv (N, 2), v down.
-
-        material: (N,). most: the largest linear value, to which colours are clipped.
-        """
+        """(N, 3) sRGB 0..255 of colour times texture at uv (N, 2), v down, clipped to most (linear)."""
         if not len(self.factors):
             return np.zeros((len(material), 3))
         linear = self.factors[material]
@@ -197,10 +191,7 @@ class Triangles:
 
 
 def triangles_from_glb(data: bytes) -> Triangles:
-    """Every triangle of every node of a binary glTF.
-
-    Raises BadGlb for damaged chunks, indices out of range and types that house.glb does not have.
-    """
+    """Every triangle of every node of a binary glTF; BadGlb for damaged or unexpected contents."""
     try:
         return _triangles(_Glb(*_chunks(data)))
     except (KeyError, IndexError, TypeError, ValueError, struct.error) as error:

@@ -1,7 +1,4 @@
-"""A finished view by its stored files: camera, table of instances, layers held to their size and type.
-
-Effects: reads files. Uses neither House nor Camera.
-"""
+"""A finished view by its stored files: camera, instances, layers; reads files, uses neither House nor Camera."""
 
 from __future__ import annotations
 
@@ -69,10 +66,7 @@ class StoredView:
         return StoredLens.of(self.table["lens"]) if "lens" in self.table else None
 
     def pixels_and_depths(self, camera: F64) -> tuple[F64, F64]:
-        """(N, 2) pixel coordinates and (N,) depths of points (N, 3) with OpenCV's axes.
-
-        NaN where the view does not see the point.
-        """
+        """(N, 2) pixels and (N,) depths of points (N, 3) with OpenCV's axes; NaN where not visible."""
         if self.lens is not None:
             plane, depth = self.lens.plane_and_depth(camera)
         else:
@@ -137,11 +131,7 @@ class StoredView:
 
 
 def views_of_house(house: Path) -> tuple[list[StoredView], dict[Path, str]]:
-    """Every view of a house folder that has a readable view.json, by name; the others' faults.
-
-    The faults are by file, for the certificate: a damaged view.json is one of them and does not
-    hide the other views. No other file is read yet.
-    """
+    """Views of a house folder with a readable view.json, by name, and the faults of the others by file."""
     views, faults = [], {}
     for file in sorted(house.glob("views/*/view.json")):
         try:
@@ -152,11 +142,7 @@ def views_of_house(house: Path) -> tuple[list[StoredView], dict[Path, str]]:
 
 
 def read_labels(view: StoredView, tally: Tally) -> dict[str, NDArray[Any]] | None:
-    """Layers by name; None if a basic one is missing, damaged or of a wrong shape.
-
-    Includes the optional layers that the view has and that can be read, without radiance. Reports
-    every fault to the tally.
-    """
+    """Layers by name, without radiance; faults are tallied, and a wrong basic layer gives None."""
     arrays = {}
     for layer in LAYERS:
         if layer.name in BASIC or (view.has(layer.file) and layer.name != "radiance"):

@@ -1,7 +1,4 @@
-"""Rows of instances in view.json against the triangles of house.glb: boxes, visible shares, truncation.
-
-Effects: holds Embree scenes of single items.
-"""
+"""Rows of instances in view.json against house.glb: boxes, shares, truncation; holds Embree scenes of items."""
 
 from __future__ import annotations
 
@@ -57,10 +54,7 @@ class HouseItems:
 
 
 def check_rows(case: ViewCase) -> None:
-    """Judge box3d, visible_fraction and truncated of every row.
-
-    An item without a triangle in house.glb fails; visible_fraction may be missing.
-    """
+    """Judge box3d, visible_fraction (if stored) and truncated of every row, whose item must have a triangle."""
     items = case.now.shared(HouseItems)
     for row in case.view.table["instances"]:
         number = int(row["id"])

@@ -1,7 +1,4 @@
-"""Light of radiance.exr against light traced again at a small size. Effects: those of the case's tracer.
-
-Only this check uses the program's own path tracer, which `verify ROOT --light` passes in.
-"""
+"""Light of radiance.exr against light that `verify ROOT --light` traces again at a small size."""
 
 from __future__ import annotations
 

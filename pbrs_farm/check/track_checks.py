@@ -1,7 +1,4 @@
-"""tracks.npz against points followed again, from the frame in which each was chosen through the stored frames.
-
-Effects: reads the file. Rays are Embree's, cameras those of view.json; faces move as house.json's motions say.
-"""
+"""tracks.npz against points followed again, by Embree and view.json's cameras, from where each was chosen."""
 
 from __future__ import annotations
 

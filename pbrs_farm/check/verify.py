@@ -1,8 +1,4 @@
-"""`pbrs-farm verify`: check a finished folder from its stored files alone.
-
-Effects: reads files. Uses no House and no code of the stages: triangles come from house.glb, cameras from view.json,
-hits from Embree.
-"""
+"""`pbrs-farm verify`: check a folder from its stored files alone, without the stages' code; reads files."""
 
 from __future__ import annotations
 
@@ -161,10 +157,7 @@ def _check_house(
     tracer: Tracer | None,
     tell: Callable[[], None],
 ) -> tuple[list[StoredView], int]:
-    """Check a house; returns its readable views, and the number of those whose light is halved.
-
-    tell: called after each view.
-    """
+    """Check a house; its readable views, and how many have halved light. tell: called after each view."""
     views, faults = views_of_house(folder)
     for file, fault in faults.items():
         place = f"{folder.name}/{file.parent.name}/view.json"

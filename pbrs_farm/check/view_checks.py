@@ -26,10 +26,7 @@ _N_IDS = 65536
 
 
 def check_pictures(case: ViewCase) -> None:
-    """No OpenGL picture is of one colour.
-
-    A light mode may be: without a window, outdoor light alone leaves a room black. That is noted.
-    """
+    """No OpenGL picture is of one colour; one of a light mode may be, and is noted."""
     for layer in LAYERS:
         if layer.step != "truth" and layer.name in case.arrays:
             picture = case.arrays[layer.name]
@@ -112,10 +109,7 @@ def _check_table(case: ViewCase) -> None:
 
 
 def check_planes(case: ViewCase) -> None:
-    """Neighbours with one instance and one normal: the plane through the first predicts the second's depth.
-
-    To rounding, and the error of a 16-bit normal on slanting faces.
-    """
+    """Of neighbours with one instance and normal, the plane through the first predicts the second's depth."""
     # Rays of unit depth through the pixels, in the camera's frame.
     arrays, view = case.arrays, case.view
     depth, normal, instance = arrays["depth"] / 1000, arrays["normal"], arrays["instance"]

@@ -1,9 +1,4 @@
-"""A small furnished home built in code, for demos without a network and for tests.
-
-Effect: reads builtin.toml beside. Two rooms side by side, a door between them, a front door, a window in each room, two
-lamps (one with a bulb, one without). The House is as a reader returns it: walls are uncut solids,
-floors and ceilings planes, so that repair runs as usual.
-"""
+"""A small furnished home of two rooms, for demos and tests; unrepaired, like a reader's. Reads builtin.toml."""
 
 from __future__ import annotations
 
@@ -90,11 +85,7 @@ _FILE: Final = read_toml(Path(__file__).with_name("builtin.toml"), BuiltinTable)
 
 
 def builtin_home() -> House:
-    """The built-in home, unrepaired; the same on every call.
-
-    Two rooms, made of code: needs no file and no download, so it suits tests and first steps. Each
-    call makes a fresh House. It is as a reader would give it; rendering wants it repaired.
-    """
+    """The built-in home, unrepaired, as a reader would give it; a fresh, equal House on every call."""
     library, index = _materials()
     openings, fillings = _openings(index)
     items = (*_wall_items(index), *_plane_items(index), *fillings, *_furniture_items(index))

@@ -19,11 +19,7 @@ from pbrs_farm.geometry.solids import box_quads, lathe, quads_surface, sphere
 
 
 def png_from_srgb8(rgb_srgb8: NDArray[np.uint8]) -> bytes:
-    """An 8-bit RGB PNG of (H, W, 3) uint8, row 0 on top.
-
-    Written by hand so that bytes do not depend on a library's version; use Pillow for pictures
-    whose bytes may differ.
-    """
+    """PNG of (H, W, 3) uint8, row 0 on top, written here so that no library's version changes its bytes."""
     height, width, _ = rgb_srgb8.shape
     rows = b"".join(b"\0" + row.tobytes() for row in rgb_srgb8)
     header = struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)
@@ -129,11 +125,7 @@ def place_piece(
     turn_deg: float,
     materials: dict[str, int],
 ) -> Item:
-    """The piece as an item, turned about +y and moved to at (3,).
-
-    turn_deg: about +y; materials: name -> index in the house. Turned parts (lathe) are round, so
-    only their place is moved.
-    """
+    """The piece as an item, turned about +y and moved to at (3,); materials: name -> index in the house."""
     turn = rotation_y(np.radians(turn_deg))
     origin = np.asarray(at, np.float64)
     surfaces = [_boxes(part, turn, origin, materials) for part in piece.parts]

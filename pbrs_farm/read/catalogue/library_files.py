@@ -62,18 +62,12 @@ class LibraryNotes:
     found: dict[Note, None] = field(default_factory=dict)
 
     def add(self, kind: str, place: str, text: str) -> None:
-        """Remember a fault of a library; the rest of it is read on.
-
-        Unlike Notes it raises nothing: a library is the user's own, and one bad model costs itself alone.
-        """
+        """Remember a fault of a library; the rest of it is read on, even if reading is strict."""
         self.found[Note(kind, shown(place, MAX_PLACE), shown(text, MAX_MESSAGE))] = None
 
 
 def opened_archive(path: Path) -> tuple[ZipResources, str]:
-    """The archive at path, its entries unread, and its sha256; BadHouse where it is damaged.
-
-    Raises BadInput where there is no such file. The digest covers the whole file and reads it once.
-    """
+    """The archive at path, its entries unread, and its sha256; BadInput without it, BadHouse for damage."""
     try:
         sha256 = digest_of_regular(path)
         with naming_kind(path):
@@ -139,10 +133,7 @@ def furniture_library(
 
 
 def licence_of(properties: Mapping[str, str]) -> str:
-    """A library's licence in short: "CC0", "CC-BY 3.0", else as written.
-
-    "" if the library names none. For display; the terms of the licence are not interpreted.
-    """
+    """A library's licence in short: "CC0", "CC-BY 3.0", else as written; "" without one."""
     text = properties.get("license", "")
     for pattern, short in _KNOWN_LICENCES:
         if re.search(pattern, text, re.IGNORECASE):
@@ -209,10 +200,7 @@ def _lights_of_row(row: dict[str, str], size: tuple[float, float, float]) -> tup
 
 
 def rgb_from_hex(text: str) -> tuple[float, float, float]:
-    """`#RRGGBB` (or `#AARRGGBB`) as sRGB 0..1; ValueError for anything else.
-
-    The leading pair of eight digits, alpha, is passed over.
-    """
+    """`#RRGGBB` (or `#AARRGGBB`, alpha ignored) as sRGB 0..1; ValueError for anything else."""
     digits = text.removeprefix("#")
     if not re.fullmatch(r"([0-9a-fA-F]{2})?[0-9a-fA-F]{6}", digits):
         raise ValueError(f"{text[:20]!r} is not a colour")

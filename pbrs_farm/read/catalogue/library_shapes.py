@@ -1,6 +1,4 @@
-"""A library's entry -> its Shape: the model turned to its front, scaled, on its base; no effects
-but reading the model from its archive.
-"""
+"""A library's entry -> its Shape: the model turned to its front, scaled, on its base. Reads the archive."""
 
 from __future__ import annotations
 
@@ -49,10 +47,7 @@ _JPEG_QUALITY: Final = 92
 def library_shape(
     entry: Entry, place: Place, turn_deg: float, contents: Resources, notes: LibraryNotes
 ) -> Shape | None:
-    """The shape of a library's piece; None, with a note, where its model cannot be used.
-
-    turn_deg: about the vertical, of a model that faces another way than its library says.
-    """
+    """The shape of a library's piece, turned about the vertical; None, with a note, for an unusable model."""
     shape_notes = Notes(entry.id, strict=False)
     materials = HomeMaterials(contents, shape_notes)
     piece = entry.piece
@@ -91,10 +86,7 @@ def library_shape(
 
 
 def fitted_shape(shape: Shape, place: Place, piece_id: str, notes: LibraryNotes) -> Shape | None:
-    """The shape as light as a home can bear it, its pictures no larger than they show.
-
-    None, with a note, where it cannot be made lighter than TOO_MANY triangles.
-    """
+    """A lighter shape with smaller pictures; None, with a note, if TOO_MANY triangles remain."""
     longest = float(np.ptp(shape.bounds, axis=0).max())
     most, coarsest = SMALL if place is Place.SURFACE else MEDIUM if longest < MEDIUM_M else LARGE
     lighter = lighter_shape(shape, most, coarsest)
@@ -105,11 +97,7 @@ def fitted_shape(shape: Shape, place: Place, piece_id: str, notes: LibraryNotes)
 
 
 def turned(piece: PlanPiece, turn_deg: float) -> PlanPiece:
-    """The piece with its model turned about the vertical within its box, by a multiple of 90 degrees.
-
-    Width and depth change places with a quarter turn, and its lamps go round with it. Other angles are
-    rounded to the nearest multiple.
-    """
+    """The piece with model and lamps turned within its box, by the nearest multiple of 90 degrees."""
     n = round(turn_deg / 90) % 4
     if not n:
         return piece

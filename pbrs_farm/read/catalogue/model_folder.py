@@ -206,10 +206,7 @@ def _measure_model(model: ObjectModel) -> Size:
 
 
 def _bounds_of_glb(path: Path) -> Any:
-    """(2, 3) box of a GLB from its accessors' bounds, without reading meshes; None if they do not suffice.
-
-    A node with an oblique rotation makes the box larger than its mesh.
-    """
+    """(2, 3) box of a GLB from its accessors' bounds (larger under oblique nodes); None without them."""
     with open_regular(path) as stream:
         head = stream.read(20)
         if len(head) < 20 or head[:4] != b"glTF" or head[16:20] != b"JSON":

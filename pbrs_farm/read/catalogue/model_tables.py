@@ -42,10 +42,7 @@ _AXES: Final = {"+z": 0, "z": 0, "+x": 3, "x": 3, "-z": 2, "-x": 1}
 
 @dataclass(frozen=True, slots=True)
 class ModelRow:
-    """A table's row for a model; missing fields are "" or None.
-
-    quarters: turns by 90 degrees about the vertical until the model's front faces +z.
-    """
+    """A table's row for a model; missing fields are "" or None. quarters: turns by 90 degrees to face +z."""
 
     name: str = ""
     group: str = ""  # a group or a class, of the user's own table: it is taken at its word

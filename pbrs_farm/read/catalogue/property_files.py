@@ -13,10 +13,7 @@ _ENTRY: Final = re.compile(r"((?:\\.|[^\s\\:=])+)\s*[:=]?\s*(.*)", re.DOTALL)
 
 
 def parse_properties(data: bytes) -> dict[str, str]:
-    """Parse a Java properties file; later lines first, malformed lines ignored.
-
-    Text is UTF-8 if it decodes, else Latin-1; a line that ends in a backslash continues.
-    """
+    """Parse a Java properties file, UTF-8 or Latin-1; later lines first, malformed lines ignored."""
     try:
         text = text_from_bytes(data)
     except UnicodeDecodeError:
@@ -40,11 +37,7 @@ def parse_properties(data: bytes) -> dict[str, str]:
 
 
 def numbered_entries(properties: dict[str, str]) -> list[dict[str, str]]:
-    """The entries `key#1`, `key#2`, ... of a catalogue, in order of their numbers.
-
-    Gaps in the numbers do not matter. Keys without a number, or with one of seven digits or more,
-    are passed over.
-    """
+    """The entries `key#1`, `key#2`, ... (at most six digits) of a catalogue, by their numbers."""
     rows: dict[int, dict[str, str]] = {}
     for key, value in properties.items():
         name, mark, number = key.partition("#")

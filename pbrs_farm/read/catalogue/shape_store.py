@@ -42,11 +42,7 @@ class ShapeStore:
         self._folder = folder
 
     def shape(self, key: tuple[str | int, ...], make: Callable[[], Shape | None]) -> Shape | None:
-        """The cached shape of a key; on a miss `make` is called and its result stored.
-
-        key: everything that determines the shape, including versions. None, for an unreadable model, is
-        stored too. If the store is not writable, results are correct but slow.
-        """
+        """The cached shape of a key, which names all inputs; made if missing. None, cached too: unreadable."""
         path = self._folder / f"{keys.digest(FORMAT, *key)}.npz"
         with suppress(OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError):
             return _read_shape(path)

@@ -120,10 +120,7 @@ def _pictures_of_library(
 
 
 def surface_group(name: str, category: str) -> str:
-    """Group of a surface, by whole words of its name, then of its category; "" = unknown.
-
-    English words, singular or plural. A category that is a place (as "kitchen") is not conclusive.
-    """
+    """Group of a surface, by whole English words of its name, then of its category; "" = unknown."""
     for text in (name, category if plain(category) not in _PLACES else ""):
         words = set(plain(text).replace("-", " ").replace("_", " ").split())
         words |= {w.removesuffix("s") for w in words}
@@ -189,10 +186,7 @@ def _seen_pictures() -> dict[str, list[_Seen]]:
 
 
 def picture_folder(path: Path, notes: LibraryNotes) -> tuple[str, tuple[Picture, ...]]:
-    """(digest, pictures of the group `prints`) of the JPEG and PNG files below a folder, by name.
-
-    EXIF orientation is applied. Undecodable files become notes.
-    """
+    """(digest, upright pictures of the group `prints`) of a folder's JPEG and PNG files; faults become notes."""
     digest, pictures = hashlib.sha256(), []
     files = sorted(p for p in path.rglob("*") if p.suffix.lower() in _SUFFIXES)
     for file in files[:MOST_PICTURES]:

@@ -168,10 +168,7 @@ def _surfaces_with_area(arch: Arch, surfaces: Sequence[Surface]) -> tuple[Surfac
 
 
 def slab_surfaces(arch: Arch, e: Element, materials: ModelMaterials) -> tuple[Surface, ...]:
-    """A floor or ceiling as a closed slab, from its points upwards by its depth.
-
-    Surfaces top, bottom and, where it has a depth, side; in the world. Those without area are not there.
-    """
+    """A floor or ceiling as a slab upwards from its points: top, bottom, side, as far as they have an area."""
     material = _material(materials, e, 0)
     # Turn the outline counter-clockwise and its holes the other way.
     low = float(e.points[0][:, 1].min())
@@ -232,10 +229,7 @@ def wall_frame(e: Element, outline: F64 | None) -> WallFrame | None:
 def wall_surfaces(
     arch: Arch, e: Element, frame: WallFrame, materials: ModelMaterials
 ) -> tuple[Surface, ...]:
-    """A wall as a closed box, without its holes: repair cuts them.
-
-    Surfaces inside, outside and edge, each with the material that the element gives that side.
-    """
+    """A wall as a closed box without holes: inside, outside and edge, each with its side's material."""
     # Turn a left-handed frame round: the box's faces must look outward.
     half = np.array([frame.length, e.height_m, e.depth_m]) / 2
     right_handed = frame.axes * [np.linalg.det(frame.axes), 1, 1]

@@ -16,11 +16,7 @@ _MOST_VALUES: Final = 24_000_000
 
 
 def bounded_json(data: bytes, file: str) -> Any:
-    """Parse JSON; BadHouse for invalid text or more values than any house has.
-
-    Counts brackets and commas before parsing, so that a small file cannot fill the memory with
-    objects. file: for messages.
-    """
+    """Parse JSON; BadHouse for invalid text, or (by counting brackets and commas first) for too many values."""
     n_groups = data.count(b"{") + data.count(b"[")
     n_values = data.count(b",")
     if n_groups > _MOST_GROUPS or n_values > _MOST_VALUES:

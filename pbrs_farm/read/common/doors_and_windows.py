@@ -1,8 +1,4 @@
-"""Doors and windows for sources that only have holes: a leaf or a pane for each hole; no effects.
-
-The model is built to the hole's size, centred in the wall: a frame as lining, leaves with handles,
-or a sash with panes.
-"""
+"""A leaf or a pane for each hole of sources that only have holes, built to the hole's size; no effects."""
 
 from __future__ import annotations
 
@@ -62,10 +58,7 @@ class Hole:
 
 
 def opening_of(hole: Hole, level_id: str, *, is_cut: bool = False) -> Opening:
-    """The opening that repair cuts for a hole, through all walls within the hole's depth.
-
-    is_cut: whether the walls have the hole already. Its quad is in the wall's centre plane.
-    """
+    """The opening that repair cuts for a hole, through its depth, unless the walls have it already."""
     half = np.array(hole.size) / 2
     corners = np.array([[-1, -1, 0], [1, -1, 0], [1, 1, 0], [-1, 1, 0.0]])
     return Opening(
@@ -83,10 +76,7 @@ def opening_of(hole: Hole, level_id: str, *, is_cut: bool = False) -> Opening:
 def fill_hole(
     hole: Hole, library: MaterialLibrary, level_id: str, room_id: str | None
 ) -> Item | None:
-    """Build the door or window for a hole; None if the hole stays open.
-
-    library: receives its materials. The item is tagged `made`, since the source does not contain it.
-    """
+    """Build the door or window for a hole, tagged `made`; None if the hole stays open."""
     if hole.kind == "open":
         return None
     is_window = hole.kind == "window"
@@ -217,11 +207,7 @@ def _window_boxes(hole: Hole) -> _Boxes:
 
 
 def merge_holes(holes: list[Hole]) -> list[Hole]:
-    """Each hole once: two that fill one place across a wall are one, as deep as both.
-
-    Two rooms often name the hole between them once each. The first keeps its id and kind; the order
-    stays.
-    """
+    """Each hole once, in order: two rooms often name one; the first keeps its id, with the depth of both."""
     merged: list[Hole] = []
     for hole in holes:
         same = next((k for k, twin in enumerate(merged) if _is_same(twin, hole)), None)

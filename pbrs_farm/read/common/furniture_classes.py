@@ -1,7 +1,4 @@
-"""NYU40 class and kind of a piece of furniture, from its catalogue id, name, size and place.
-
-Reads the tables beside this file (classes of the default catalogue; words; words that describe), nothing else.
-"""
+"""NYU40 class and kind of a piece of furniture by its id, name, size and place. Reads the tables beside it."""
 
 from __future__ import annotations
 
@@ -207,10 +204,7 @@ _LONGEST_NAME: Final = 500  # maximum letters of a name to analyse
 
 
 def _words_in_order(name: str) -> list[str]:
-    """Words and separate numbers; numbers inside words ("chair01") are dropped.
-
-    Words for the item's place ("bed room") are dropped too.
-    """
+    """Words and separate numbers, without words for the item's place and numbers inside words ("chair01")."""
     words = re.findall(r"(?<![^\W_])\d+|[^\W\d_]+", plain(name))
     of_rooms = {
         k for k, (word, after) in enumerate(pairwise(words)) if word in _OF_A_ROOM.get(after, ())
@@ -413,18 +407,12 @@ def class_of_piece(
 
 
 def nyu40_of(catalogue_id: str, name: str, group: str = "") -> int | None:
-    """NYU40 id of a piece whose size is not known; None where nothing says one.
-
-    As class_of_piece, which also says by which rule and checks the class against the size.
-    """
+    """NYU40 id of a piece of unknown size, by the rules of class_of_piece; None if none applies."""
     return class_of_piece(catalogue_id, name, group).nyu40
 
 
 def kind_of(piece: PieceClass, nyu40: int, *, is_opening: bool, is_light: bool) -> ItemKind:
-    """Item kind of a piece: by the source's own element first, then class, then words.
-
-    nyu40: the item's final class, which the source's element may have decided.
-    """
+    """Item kind of a piece: by the source's own element first, then its final class, then words."""
     if is_opening:
         return ItemKind.WINDOW if nyu40 == WINDOW else ItemKind.DOOR
     if is_light:

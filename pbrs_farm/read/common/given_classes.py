@@ -36,20 +36,12 @@ class GivenClass(NamedTuple):
 
 
 def given_class(source: str, name: str) -> GivenClass | None:
-    """Class of a data set's name (given_classes.csv); None if the table has no row.
-
-    source: the vocabulary, such as `3dfuture`, `hssd`, `ifc`. name: in any case. A class of -1 means
-    that the words of the item's name decide.
-    """
+    """Class of a name, in any case, of a vocabulary such as `hssd`; None if the table has no row."""
     return _classes_by_name().get((source, _key_of_name(name)))
 
 
 def class_by_words(*names: str) -> GivenClass | None:
-    """The class of the first name whose words say one, as of a piece of furniture.
-
-    names: the likeliest first. For sources whose vocabulary no table has; a guess, so tables go
-    before it.
-    """
+    """A guess for vocabularies without a table: the class of the first name (the likeliest) with known words."""
     for name in names:
         piece = class_of_piece("", name)
         if piece.nyu40 is not None:

@@ -46,10 +46,7 @@ class HouseBuilder:
     openings: list[Opening] = field(default_factory=list)
 
     def set_rooms(self, rooms: Sequence[Room]) -> dict[str, str]:
-        """Sort the rooms into levels by their floors and number them; their own ids -> the new ones.
-
-        Raises BadHouse for more rooms, or more overlapping ones, than are taken apart.
-        """
+        """Sort rooms into numbered levels; own ids -> new ones. BadHouse for too many or too much overlap."""
         self.levels, self.rooms = levels_of(rooms)
         check_rooms(self.rooms, self.file)
         return {old.id: new.id for old, new in zip(rooms, self.rooms, strict=True)}

@@ -1,7 +1,4 @@
-"""Table of the material fields of glTF, USD and MTL, and how each is read.
-
-`python -m pbrs_farm.read.common.material_fields` prints the rows of docs/houses/surfaces.md. Effect: reads the table.
-"""
+"""Table of the material fields of glTF, USD and MTL; as a program, prints the rows of docs/houses/surfaces.md."""
 
 from __future__ import annotations
 

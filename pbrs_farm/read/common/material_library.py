@@ -47,11 +47,7 @@ class LoadedTexture(NamedTuple):
 
 
 def texture_from_bytes(data: bytes, name: str) -> LoadedTexture:
-    """The texture and what its alpha holds. PNG and JPEG keep their bytes; GIF, BMP, TIFF and WebP
-    become PNG.
-
-    Raises ValueError with the reason for a picture that cannot be decoded or is too large.
-    """
+    """The texture (PNG or JPEG, others become PNG) and what its alpha holds; ValueError with a reason."""
     picture = opened_picture(data)
     alpha = _alpha_range(picture)
     # Store other kinds as PNG, with alpha where it is not opaque.
@@ -65,10 +61,7 @@ def texture_from_bytes(data: bytes, name: str) -> LoadedTexture:
 
 
 def opened_picture(data: bytes, *, whole: bool = False) -> Image.Image:
-    """A picture of a kind that houses may use, decoded: a JPEG at an eighth of its size unless whole.
-
-    Raises ValueError with the reason where it cannot be decoded or is too large.
-    """
+    """A decoded picture, a JPEG at an eighth of its size unless whole; ValueError with a reason."""
     try:
         with warnings.catch_warnings():
             warnings.simplefilter("ignore")  # of odd metadata in a picture that decodes
@@ -140,10 +133,7 @@ def _png_bytes(picture: Image.Image) -> bytes:
 
 
 class MaterialLibrary:
-    """Numbers materials and decodes every picture once, in the order they first come up.
-
-    The one way in for materials and textures of all formats.
-    """
+    """Numbers the materials of any format, and decodes every picture once, as they first come up."""
 
     def __init__(self, notes: Notes) -> None:
         self._notes = notes
@@ -163,18 +153,11 @@ class MaterialLibrary:
         return {t.id: t for t in loaded_textures if t.id in used}
 
     def index(self, material: Material) -> int:
-        """The material's index in the house, the same for equal materials.
-
-        Only indexed materials, with their textures, become part of the house.
-        """
+        """The index of a material, which thereby belongs to the house; the same for equal materials."""
         return self._materials.setdefault(material, len(self._materials))
 
     def adopted(self, other: MaterialLibrary) -> tuple[int, ...]:
-        """The indices here of the materials of another library, which is taken in with its textures.
-
-        Equal materials become one. Entry k of the answer is the index here of the other's material
-        k: surfaces have to be numbered anew by it.
-        """
+        """Take in another library; entry k of the answer is the index here of its material k."""
         for loaded in other._loaded.values():
             if loaded is not None:
                 self._loaded.setdefault(f"texture {loaded.texture.id}", loaded)
@@ -193,10 +176,7 @@ class MaterialLibrary:
         return self._loaded[key]
 
     def colours_of_faces(self, rgb: NDArray[np.uint8], name: str) -> tuple[F64, str]:
-        """(F, 2) texture coordinates, one place a face, and the id of the picture of their colours.
-
-        rgb: (F, 3) sRGB. Blocks of 4 x 4 texels, so that filtering stays within a colour.
-        """
+        """(F, 2) coordinates in a picture of the faces' sRGB (F, 3), 4 x 4 texels each, and its id."""
         colours, of_face = np.unique(rgb, axis=0, return_inverse=True)
         side = int(np.ceil(np.sqrt(len(colours))))
         grid = np.zeros((side * side, 3), np.uint8)

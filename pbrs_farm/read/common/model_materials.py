@@ -1,7 +1,4 @@
-"""Materials of models in OBJ: what their MTL says, under the overrides of whoever places them.
-
-Effect: reads pictures of the models' folder.
-"""
+"""Materials of OBJ models by their MTL, under overrides of those who place them. Reads pictures."""
 
 from __future__ import annotations
 
@@ -38,11 +35,7 @@ class ModelMaterials:
     def material(
         self, mtl: ObjMaterial | None, override: Override | None, *, place: str, clear: MaterialKind
     ) -> Material:
-        """A model's material as a node overrides it.
-
-        mtl: the model's, its texture a name below the root; None = grey. clear: the kind of
-        what lets light through (d < 1).
-        """
+        """A model's material (grey without an MTL) as a node overrides it. clear: the kind if d < 1."""
         base = mtl or ObjMaterial("")
         diffuse, reference = base.kd, base.map_kd
         if override is not None and override.texture is not None:
@@ -69,10 +62,7 @@ class ModelMaterials:
     def wall_material(
         self, mtl: ObjMaterial | None, override: Override | None, *, place: str
     ) -> Material:
-        """A wall's material; one that nobody chose is white and marked as default.
-
-        That is no colour at all, or a default paper, whose colour the published pictures ignore.
-        """
+        """A wall's material; without a colour, or with a default paper, white and marked as default."""
         material = self.material(mtl, override, place=place, clear=MaterialKind.GLASS)
         picture = mtl.map_kd if mtl is not None else ""
         is_unpainted = mtl is None or (not picture and mtl.kd == GREY)

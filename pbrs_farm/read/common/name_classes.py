@@ -148,10 +148,7 @@ def _class_of_words(name: str, size: PieceSize | None) -> NodeClass | None:
 
 
 def _piece(name: str, size: PieceSize | None) -> PieceClass:
-    """The class of a name as of a piece: where its size refuses every word, the first word's.
-
-    A person and a plant need their size: repair removes them. An item far too large has no class.
-    """
+    """The class of a name as of a piece; persons and plants of a wrong size keep it, as repair removes them."""
     piece = class_of_piece("", name, "", size)
     if size is None:
         return piece

@@ -28,10 +28,7 @@ HARMLESS: Final = frozenset(
 
 
 class Notes:
-    """The notes of one house, each once; every reader adds its notes here.
-
-    strict: a note whose kind is not HARMLESS is raised as BadHouse (recipe field read.strict).
-    """
+    """The notes of one house, each once. strict: a note not in HARMLESS is raised (recipe field read.strict)."""
 
     def __init__(self, file: str, *, strict: bool) -> None:
         self.file = file

@@ -72,11 +72,7 @@ class _WallFrame:
 
 
 def openings(items: Sequence[Item]) -> tuple[Opening, ...]:
-    """An opening for every door and window that has a box and is in a wall.
-
-    items: all of a house, including walls. A leaf outside any wall has no opening and is not an error.
-    Openings are not cut here: repair does that.
-    """
+    """An opening, not cut yet, for every door and window that is in one of the walls among the items."""
     frames = [f for item in items if item.kind is ItemKind.WALL for f in _frames(item)]
     results = []
     for item in items:
@@ -374,8 +370,5 @@ def _hole(points: F64, low: F64, high: F64) -> tuple[F64, F64] | None:
 
 
 def box_between(low: F64, high: F64, axes: F64) -> Surface:
-    """A closed box between two corners.
-
-    low, high: (3,) in the frame of axes, (3, 3) unit columns along the wall, up and across it.
-    """
+    """A closed box between two corners in the frame of axes: (3, 3) columns along the wall, up, across."""
     return box("cutter", axes @ ((low + high) / 2), (high - low) / 2, 0, axes=axes)

@@ -1,8 +1,4 @@
-"""Convert picture values that a format defines differently: a channel, a scale, a bias, a curve.
-
-No effects. A surface knows three kinds of pictures (colour in sRGB, roughness in green, normals);
-all other conventions are converted here, once.
-"""
+"""Convert picture values to the conventions of a Surface: a channel, a scale, a bias, a curve; no effects."""
 
 from __future__ import annotations
 
@@ -32,10 +28,7 @@ class PictureValues(NamedTuple):
 
 
 def picture_of_values(data: bytes, values: PictureValues) -> bytes:
-    """PNG of a picture with its values changed, alpha kept; its own bytes where nothing changes.
-
-    Raises ValueError with the reason where it cannot be decoded or is too large.
-    """
+    """PNG of a picture with its values changed, alpha kept, or its own bytes; ValueError with a reason."""
     picture = opened_picture(data, whole=True).convert("RGBA")
     bands = picture.split()
     stored = np.arange(256) / 255
@@ -52,10 +45,7 @@ def picture_of_values(data: bytes, values: PictureValues) -> bytes:
 
 
 def picture_mean(data: bytes, *, is_colour: bool) -> F64:
-    """(3,) mean of a picture: of a colour in linear light, else of its values as stored.
-
-    Raises ValueError as `picture_of_values` does.
-    """
+    """(3,) mean of a picture's values, of a colour in linear light; ValueError with a reason."""
     rgb = _texels(data, _MEAN_PX)[..., :3]
     return np.asarray((linear_from_srgb(rgb) if is_colour else rgb).mean((0, 1)))
 

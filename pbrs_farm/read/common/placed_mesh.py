@@ -20,10 +20,7 @@ ASSUMED_LM: Final = 800.0
 
 
 def placed(mesh: Mesh, world_from_model: F64, *, name: str, material: int) -> Surface | None:
-    """A mesh as a Surface in the world; None if no area is left.
-
-    A mirroring transform turns the winding, so that fronts stay in front. Degenerate faces go.
-    """
+    """A mesh as a Surface in the world, fronts kept in front; None if no area is left."""
     world = transform_points(world_from_model, mesh.positions).astype(np.float32)
     faces = mesh.faces
     if np.linalg.det(world_from_model[:3, :3]) < 0:
@@ -53,11 +50,7 @@ def _normals(normals: F64, world_from_model: F64) -> F32 | None:
 
 
 def oriented_box(meshes: Sequence[Mesh], world_from_model: F64) -> Box | None:
-    """The model's own axis-aligned box, placed in the world; None where the transform shears.
-
-    meshes: of the model, in its own frame. world_from_model: (4, 4). The axes are the model's columns x,
-    y, z made right-handed, so that a mirrored model has a box of the same place and size.
-    """
+    """The model's axis-aligned box, placed in the world, right-handed; None where the transform shears."""
     low = np.min([m.positions.min(0) for m in meshes], 0)
     high = np.max([m.positions.max(0) for m in meshes], 0)
     # Part the transform into scale and axes; a shear has no such parts.
@@ -73,20 +66,13 @@ def oriented_box(meshes: Sequence[Mesh], world_from_model: F64) -> Box | None:
 
 
 def assumed_light(item: Item) -> LightPart:
-    """A light at the centre of a lamp without light data in the scene.
-
-    Its flux is ASSUMED_LM. Use it only if the source calls the item a lamp and has no data on its
-    light.
-    """
+    """A light of ASSUMED_LM at the centre of an item that its source only calls a lamp."""
     centre = item.bounds.mean(0)
     return LightPart(triple(centre), BULB_RADIUS_M, ASSUMED_LM, PowerUnit.LUMEN)
 
 
 def across_last(box: Box) -> Box:
-    """Reorder the box's axes so that its thinnest horizontal axis, a door's or window's front, is +z.
-
-    A box that is not upright has no two horizontal axes and is returned unchanged.
-    """
+    """The box's axes reordered: its thinnest horizontal axis, a door's front, is +z; tilted boxes unchanged."""
     level = np.flatnonzero(np.abs(box.axes[1]) < 0.1)
     if len(level) != 2:
         return box

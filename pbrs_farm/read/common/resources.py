@@ -63,10 +63,7 @@ class ZipResources:
             raise BadHouse(self._file, place, text)
 
     def read(self, name: str) -> bytes | None:
-        """The entry's bytes, or None for an unknown name.
-
-        Raises BadHouse for a damaged entry, and for one that unpacks to more than its declared size.
-        """
+        """The entry's bytes, or None for an unknown name; BadHouse for damage or more than the declared size."""
         entry = self._entries.get(name)
         if entry is None:
             return None

@@ -1,8 +1,4 @@
-"""Floor polygon and heights of a room from its meshes; no effects.
-
-The walkable polygon is the top of the floor's mesh minus the walls on it: SUNCG's floor slab
-extends below the walls (docs/spec/suncg.md section 1.5).
-"""
+"""Floor polygon and heights of a room from its meshes, whose floors may extend below the walls; no effects."""
 
 from __future__ import annotations
 
@@ -30,10 +26,7 @@ _TRACE_M: Final = 0.005  # half the width of the strip that a planar wall cuts
 
 
 def floor_height(surfaces: Sequence[Surface]) -> float | None:
-    """World y of the highest upward faces, the walkable surface; None without any.
-
-    surfaces: of one room's floor, metres. Only horizontal faces count.
-    """
+    """World y, in metres, of the highest horizontal upward faces of a floor; None without any."""
     corners = _faces_looking(surfaces, 1)
     return None if not len(corners) else float(corners[..., 1].mean(1).max())
 
@@ -45,10 +38,7 @@ def ceiling_height(surfaces: Sequence[Surface]) -> float | None:
 
 
 def floor_polygon(floor: Sequence[Surface], walls: Sequence[Surface]) -> F64 | None:
-    """(N, 2) plan (x, z), counter-clockwise, of the largest piece of floor between the walls.
-
-    None if the floor has no area.
-    """
+    """(N, 2) plan (x, z), counter-clockwise, of the largest piece of floor between the walls; None without area."""
     corners = _faces_looking(floor, 1)
     if not len(corners):
         return None
@@ -61,10 +51,7 @@ def floor_polygon(floor: Sequence[Surface], walls: Sequence[Surface]) -> F64 | N
 
 
 def covered_share(surface: Surface, polygon: F64) -> float:
-    """Share of a plan polygon (N, 2) covered by the surface's horizontal faces.
-
-    In [0, 1], 0 for a polygon without area. Overlapping faces count once.
-    """
+    """Share 0..1 of a plan polygon (N, 2) that the surface's horizontal faces cover."""
     # A planar ceiling may look either way.
     flat = np.concatenate([_faces_looking([surface], 1), _faces_looking([surface], -1)])
     area: Any = shapely.Polygon(polygon)
@@ -143,11 +130,7 @@ def _traces(walls: Sequence[Surface]) -> Any:
 
 
 def enclosed_polygon(walls: Sequence[Surface]) -> F64 | None:
-    """The largest plan area between walls, for a room without a floor; None if there is none.
-
-    walls: of one room. An estimate: if the walls do not close, the area between them and their hull
-    counts too. (N, 2) world (x, z).
-    """
+    """(N, 2) world (x, z) of the largest area between a room's walls or, if open, their hull; or None."""
     # The area between the walls is the part of their hull that no wall covers.
     footprint = _outline_from_above(
         np.concatenate([_faces_looking(walls, 1), _faces_looking(walls, -1)])

@@ -21,11 +21,7 @@ _MIN_SHARED_M2: Final = 0.05
 
 
 def check_rooms(rooms: Sequence[Room], file: str) -> None:
-    """Raise BadHouse, naming the file, for too many rooms, or rooms drawn over each other.
-
-    For readers of strangers' files: overlapping rooms are taken apart pair by pair, which takes
-    long where they are many.
-    """
+    """Raise BadHouse for too many rooms, or too many overlapping ones, which take long to take apart."""
     by_level: dict[str, list[Points2]] = {}
     for room in rooms:
         by_level.setdefault(room.level_id, []).append(room.polygon)
@@ -46,11 +42,7 @@ _LOW_M, _HIGH_M = 1.0, 40.0  # a room's height
 
 
 def check_unit(rooms: Sequence[Room], file: str, place: str, hint: str) -> None:
-    """Raise BadHouse for rooms of no size that a home has: the file's lengths are in another unit.
-
-    The rooms together must be 0.6 to 500 m wide, and 1 to 40 m high in the middle. place, hint: for the
-    message, where the file says its unit.
-    """
+    """Raise BadHouse unless the rooms together are 0.6 to 500 m wide and in the middle 1 to 40 m high."""
     plan = np.concatenate([room.polygon for room in rooms])
     wide = float(np.ptp(plan, axis=0).max())
     high = float(np.median([room.ceiling_y - room.floor_y for room in rooms]))

@@ -37,10 +37,7 @@ CLASS_OF_STRUCTURE: Final = {ItemKind.WALL: WALL, ItemKind.FLOOR: FLOOR, ItemKin
 
 
 def planar_parts(item: Item) -> tuple[Item, ...]:
-    """Split an open wall mesh into one item per plane (to a degree and a centimetre).
-
-    A closed wall, a single-plane wall and any other item are returned unchanged.
-    """
+    """Split an open wall mesh into an item per plane (to a degree and a centimetre); other items unchanged."""
     if item.kind is not ItemKind.WALL or _is_closed(item.surfaces):
         return (item,)
     plane_of_face = plane_of_faces(item.surfaces)
@@ -67,10 +64,7 @@ def _is_closed(surfaces: Sequence[Surface]) -> bool:
 
 
 def plane_of_faces(surfaces: Sequence[Surface]) -> I64:
-    """(F,) plane index of each face, ignoring orientation, in order of first appearance.
-
-    Faces of all surfaces, concatenated. Planes that agree to about a degree and a centimetre are one.
-    """
+    """(F,) plane index, to a degree and a centimetre, ignoring orientation, of all surfaces' faces in turn."""
     p = corners_of_surfaces(surfaces)
     n = area_vectors(p)
     n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-12)
@@ -120,11 +114,7 @@ def room_parts(item: Item, others: F64) -> tuple[Item, ...]:
 
 
 def components(corners: F64) -> I64:
-    """(F,) number of the connected mesh that each face belongs to, from 0.
-
-    corners: (F, 3, 3) of the faces, metres. Faces are connected where two corners lie at one place to
-    within _WELD_M, whether or not they share a vertex.
-    """
+    """(F,) number of the connected mesh of each face; corners (F, 3, 3) within _WELD_M are one."""
     keys = np.rint(corners.reshape(-1, 3) / _WELD_M)
     _, place = np.unique(keys, axis=0, return_inverse=True)
     faces = place.reshape(-1, 3)
@@ -163,10 +153,7 @@ def _is_large(low: F64, high: F64) -> Bools:
 
 
 def bounds_of_shells(corners: F64, shell_of_face: I64) -> F64:
-    """(S, 2, 3) lowest and highest corner of each shell.
-
-    corners: (F, 3, 3); shell_of_face: (F,) from 0, every number up to the largest used.
-    """
+    """(S, 2, 3) lowest and highest corner of each shell, by the faces' corners and shell numbers."""
     order = np.argsort(shell_of_face, kind="stable")
     starts = np.searchsorted(shell_of_face[order], np.arange(int(shell_of_face.max()) + 1))
     low = np.minimum.reduceat(corners.min(1)[order], starts)
@@ -185,11 +172,7 @@ def _split(item: Item, chosen: Bools) -> list[Bools]:
 
 
 def picked(item: Item, chosen: Bools) -> tuple[Surface, ...]:
-    """The item's surfaces with the chosen faces alone, empty ones left out.
-
-    chosen: (F,) over the faces of all surfaces of the item, one after another. Vertices that no
-    face uses are left out as `part_of` does.
-    """
+    """The item's surfaces with the chosen (F,) faces alone, without unused vertices and empty surfaces."""
     pairs = zip(item.surfaces, _split(item, chosen), strict=True)
     return tuple(part_of(s, s.faces[is_own], s.name) for s, is_own in pairs if is_own.any())
 

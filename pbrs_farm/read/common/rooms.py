@@ -42,10 +42,7 @@ _NEXT_ROOM: Final = 0.05
 
 
 def rooms_from_json(data: bytes, file: str, items: Sequence[Item]) -> list[Room]:
-    """The rooms of a polygon file; missing heights are taken from floors and ceilings.
-
-    Raises BadHouse, naming the invalid room.
-    """
+    """The rooms of a polygon file, as rooms_from_value; BadHouse, naming the invalid room."""
     return rooms_from_value(json_from_bytes(data, file), file, items)
 
 
@@ -120,11 +117,7 @@ def rooms_from_floors(items: Sequence[Item]) -> list[Room]:
 
 
 def rooms_from_walls(items: Sequence[Item]) -> list[Room]:
-    """The rooms that walls enclose where no floor is drawn, from the foot of the walls of each storey.
-
-    items: of the whole scene. Lower walls than a parapet enclose nothing; the rooms are as those of
-    rooms_from_floors.
-    """
+    """Rooms enclosed by walls above parapet height where no floor is drawn, as those of rooms_from_floors."""
     walls = [i for i in items if i.kind is ItemKind.WALL and np.ptp(i.bounds[:, 1]) >= LEAST_WALL_M]
     doors = [i.box for i in items if i.kind is ItemKind.DOOR and i.box is not None]
     rooms: list[Room] = []
@@ -231,19 +224,13 @@ def levels_of(rooms: Sequence[Room]) -> tuple[tuple[Level, ...], tuple[Room, ...
 
 
 def level_of(levels: Sequence[Level], y: float) -> str:
-    """The id of the highest level at or below a height, with half a metre of slack; else of the lowest.
-
-    levels: from below, at least one. y: of the world, metres.
-    """
+    """The id of the highest level at or below y (world, metres; half a metre of slack), else of the lowest."""
     below = [x.id for x in levels if x.elevation <= y + _SAME_LEVEL_M]
     return below[-1] if below else levels[0].id
 
 
 def room_at(rooms: Sequence[Room], point: F64) -> str | None:
-    """The room whose polygon and height hold a point (3,) of the world, or None.
-
-    A point in a wall (of a door, a window) belongs to the nearest room on the other side of it.
-    """
+    """The room that holds a point (3,) of the world; of a point in a wall, that on its other side; or None."""
     x, y, z = point
     rooms_at_height = [r for r in rooms if r.floor_y - _SLACK_M <= y <= r.ceiling_y + _SLACK_M]
     if not rooms_at_height:

@@ -23,10 +23,7 @@ class RootFolder:
         self._read: dict[str, str] = {}  # name -> sha256
 
     def name_from(self, folder: str, reference: str) -> str:
-        """The name below root that a reference inside a folder means, with "/" between folders.
-
-        Backslashes count as "/". Raises BadHouse where it leads out of root.
-        """
+        """The name below root of a reference ("/" or backslashes) in a folder; BadHouse if it leads out."""
         joined = posixpath.normpath(posixpath.join(folder, reference.replace("\\", "/")))
         if joined.startswith(("/", "../")) or joined == ".." or "\0" in joined:
             raise BadHouse(self.root, folder, f"{reference[:80]!r} leads out of the folder")
@@ -55,10 +52,7 @@ class RootFolder:
         return (self.root / self.name_from("", name)).is_dir()
 
     def names(self, folder: str, suffixes: tuple[str, ...]) -> list[str]:
-        """Names of the files directly in a folder below root whose suffix is one of some.
-
-        They begin with the folder, as `read` takes them; [] where the folder is not there.
-        """
+        """Names (with the folder, as `read` takes them) of a folder's files with these suffixes; or []."""
         below = self.root / self.name_from("", folder)
         if not below.is_dir():
             return []
@@ -91,9 +85,6 @@ class RootFolder:
 
     @property
     def sha256(self) -> str:
-        """Hex digest over the names and the bytes of every file read so far.
-
-        The same whatever the order of reading. It grows with every file: ask at the end.
-        """
+        """Hex digest over the names and bytes of all files read so far, in whatever order."""
         lines = "".join(f"{digest}  {name}\n" for name, digest in sorted(self._read.items()))
         return hashlib.sha256(lines.encode()).hexdigest()

@@ -33,10 +33,7 @@ class Layered:
 
 
 def read_mtl(folder: RootFolder, name: str) -> tuple[ObjMaterial, ...] | None:
-    """The library's materials, map_kd and map_d as names below the root; None if the file does not exist.
-
-    Raises BadHouse for a picture outside the folder.
-    """
+    """The library's materials, pictures as names below the root, or None; BadHouse for a picture outside."""
     data = folder.read(name, max_bytes=_MAX_MTL_BYTES)
     if data is None:
         return None
@@ -51,41 +48,27 @@ def read_mtl(folder: RootFolder, name: str) -> tuple[ObjMaterial, ...] | None:
 
 
 class SourceFiles:
-    """Files inspected while sources are identified, each read once; state: a cache.
-
-    Listing never fails: a damaged file or one outside its folder counts as absent here; the reader
-    reports the fault.
-    """
+    """Files inspected while sources are identified, each read once; damaged ones count as absent."""
 
     def __init__(self) -> None:
         self._digests: dict[tuple[Path, str], str] = {}  # (root, name) -> sha256, "" = no file
         self._pictures: dict[tuple[Path, str], tuple[str, ...]] = {}  # of material libraries
 
     def file_digest(self, path: Path) -> str:
-        """SHA-256 of a file, taken once, however many houses read it.
-
-        Raises OSError where it cannot be read.
-        """
+        """SHA-256 of a file, taken once, however many houses read it; OSError if unreadable."""
         key = (path, "")
         if key not in self._digests:
             self._digests[key] = digest_of_regular(path)
         return self._digests[key]
 
     def digest(self, folder: RootFolder, names: Iterable[str]) -> str:
-        """Digest over the names and bytes of the existing files below a folder; "" if there are none.
-
-        Adding, changing or removing a file changes the digest, so that the step runs again. Damaged
-        files and files outside the folder count as absent: the reader reports them.
-        """
+        """Digest over names and bytes of the files below a folder that exist; "" if there are none."""
         digests = {name: self._digest(folder, name) for name in names}
         lines = [f"{digest}  {name}\n" for name, digest in sorted(digests.items()) if digest]
         return hashlib.sha256("".join(lines).encode()).hexdigest() if lines else ""
 
     def pictures(self, folder: RootFolder, mtl: str) -> tuple[str, ...]:
-        """Names below the root of the pictures in a material library.
-
-        Empty for a missing or damaged library. Cached, so that models of one folder share the result.
-        """
+        """Names below the root of the pictures in a material library, cached; () if it is damaged."""
         key = (folder.root, mtl)
         if key not in self._pictures:
             try:

@@ -1,7 +1,4 @@
-"""Parse and check a 3D-FRONT house's JSON: meshes, furniture, rooms, doors and lights; no effects.
-
-Structure has world coordinates (metres, y up); only furniture is placed by its room's child.
-"""
+"""Parse and check a 3D-FRONT house's JSON (metres, y up; only furniture has a placement); no effects."""
 
 from __future__ import annotations
 
@@ -93,10 +90,7 @@ class FrontFile:
 
 
 def front_file(data: bytes, file: str, notes: Notes) -> FrontFile:
-    """Parse a house. Raises BadHouse, naming the invalid entry.
-
-    data: JSON of 3D-FRONT. notes: receives omissions. Models are not read: pieces name them by `jid`.
-    """
+    """Parse a house, without the models of its pieces; BadHouse, naming the invalid entry."""
     value = checked(dict, bounded_json(data, file), file, error=BadHouse, hint=_HINT)
     scene = value.get("scene")
     if not value.get("mesh") or not isinstance(scene, dict) or not scene.get("room"):
@@ -157,10 +151,7 @@ def _parse_front_rooms(
 
 
 def numbers(value: Any, n: int, file: str, place: str) -> F64:
-    """(n,) finite numbers of a list, or all where n is 0; BadHouse naming the place.
-
-    file, place: for the message. Numbers of 1e12 and more count as damage.
-    """
+    """(n,) finite numbers of a list, or all where n is 0; BadHouse, naming the place, also from 1e12 on."""
     try:
         vector = np.array(value if isinstance(value, list) else [None], np.float64)
     except (ValueError, TypeError, OverflowError):

@@ -96,10 +96,7 @@ def companions_of_front3d(given: GivenFile, files: SourceFiles) -> str:
 
 
 def read_front3d(given: GivenFile, fields: ReadFields) -> House:
-    """Read the house. models: 3D-FUTURE's folder, "" = beside or above the file.
-
-    Raises BadHouse, naming the invalid entry, and for a file without meshes or rooms.
-    """
+    """Read the house; BadHouse, naming the invalid entry. models: 3D-FUTURE's folder, "" = beside or above."""
     path, models = given.path, given.models
     folder = RootFolder(path.parent)
     data = folder.read(path.name, max_bytes=MAX_JSON_BYTES)

@@ -44,10 +44,7 @@ def is_opening(piece: FrontPiece) -> bool:
 def holes_with_names(
     house: FrontFile, holes: Sequence[tuple[Hole, WallPiece]], notes: Notes
 ) -> list[Hole]:
-    """Every hole once, with its kind, style and hinge; hole meshes without a gap have one, too.
-
-    A door or window of the furniture outside every hole becomes a note.
-    """
+    """Every hole once, with kind, style and hinge; openings in the furniture without a hole become notes."""
     named = _openings_by_name(house)[:_MAX_NAMED]
     results = []
     for hole, piece in holes:

@@ -319,11 +319,7 @@ def _stretches(
 def solid_of(
     piece: WallPiece, pieces: Sequence[WallPiece], materials: tuple[int, int, int]
 ) -> tuple[Surface, ...]:
-    """A piece of wall as a closed solid without its holes.
-
-    pieces: all of them, as ends that meet are mitred. materials: indices of the side towards the room, of
-    the side behind, of the rest.
-    """
+    """A piece of wall as a closed solid without holes, mitred with pieces. materials: room side, back, rest."""
     sheet = piece.sheet
     _, y0, _, y1 = sheet.bounds
     front = [sheet.point(s, 0.0)[[0, 2]] for s in (piece.s0, piece.s1)]
@@ -364,10 +360,7 @@ def _back_corner(piece: WallPiece, s: float, corner: F64, pieces: Sequence[WallP
 
 
 def holes_of(pieces: Sequence[WallPiece]) -> list[tuple[Hole, WallPiece]]:
-    """Gaps of the sheets with their wall pieces; kind "open" until a door or window is assigned.
-
-    A gap closed by the sheet behind is not a hole. Holes go through the whole thickness.
-    """
+    """Gaps through the whole thickness, with their wall pieces; kind "open" until a door or window is assigned."""
     by_sheet: dict[int, list[WallPiece]] = {}
     for piece in pieces:
         by_sheet.setdefault(id(piece.sheet), []).append(piece)

@@ -54,10 +54,7 @@ class Assembly:
     def asset(
         self, name: str, rgba: Sequence[float] | None = None
     ) -> tuple[list[int], Gltf] | None:
-        """Root nodes of an asset (glTF, OBJ, STL) in the document, added if it is new; None without the file.
-
-        rgba: sRGB-encoded colour of an OBJ or STL without materials.
-        """
+        """Root nodes of a glTF, OBJ or STL (in rgba without materials), added if new; None without the file."""
         is_mesh = name.lower().endswith((".obj", ".stl"))
         key = f"{name} {rgba}" if is_mesh else name
         if key in self.assets:

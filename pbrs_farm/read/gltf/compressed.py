@@ -1,8 +1,4 @@
-"""Compressed parts of a glTF file: Draco meshes, KTX2 pictures in Basis Universal; no effects.
-
-The decoders are optional packages (the extra `gltf`); without one a file that needs it is refused
-by name with the command that converts it.
-"""
+"""Draco meshes and KTX2 pictures of glTF, by optional packages; a missing one is an error. No effects."""
 
 from __future__ import annotations
 
@@ -28,10 +24,7 @@ _MOST_POINTS: Final = 20_000_000
 
 
 def draco_arrays(gltf: Gltf, primitive: dict[str, Any], place: str) -> DracoMesh | None:
-    """Decode a primitive's Draco data; None for a primitive without Draco.
-
-    Raises BadHouse for damaged data, other counts than the accessors', and without DracoPy.
-    """
+    """Decode a primitive's Draco data, if any; BadHouse for damage, wrong counts, and without DracoPy."""
     extensions = primitive.get("extensions")
     row = extensions.get(DRACO) if isinstance(extensions, dict) else None
     if not isinstance(row, dict):
@@ -74,10 +67,7 @@ class DracoMesh:
 
 
 def decoded_picture(data: bytes) -> bytes:
-    """PNG bytes of a KTX2 picture; other pictures unchanged.
-
-    Raises ValueError with the reason if it cannot be decoded or no decoder is installed.
-    """
+    """PNG bytes of a KTX2 picture, others unchanged; ValueError with the reason."""
     if not data.startswith(_KTX2):
         return data
     if len(data) < 80:

@@ -1,7 +1,4 @@
-"""A .glb or .gltf with its buffers, and the placed meshes of its scene; no effects.
-
-Buffers and pictures outside the file come through a function that the caller gives.
-"""
+"""A .glb or .gltf with its buffers (outside ones by a given function) and placed meshes; no effects."""
 
 from __future__ import annotations
 
@@ -74,10 +71,7 @@ class Placed:
 
 
 def gltf_document(data: bytes, file: str, fetch: Fetch) -> Gltf:
-    """Parse a .glb or .gltf with all its buffers.
-
-    Raises BadHouse for a damaged file, an unsupported required extension, a missing buffer.
-    """
+    """Parse a .glb or .gltf with all buffers; BadHouse for damage or an unsupported required extension."""
     gltf = _parse_gltf(data, file)
     if not isinstance(gltf.document.get("asset"), dict):
         raise BadHouse(file, "asset", "is missing; this is not a glTF file")
@@ -91,10 +85,7 @@ def gltf_document(data: bytes, file: str, fetch: Fetch) -> Gltf:
 
 
 def _with_instances(gltf: Gltf) -> Gltf:
-    """The document with a node for each instance of EXT_mesh_gpu_instancing.
-
-    The new nodes are siblings of the instanced node, with its name, so that each is an item.
-    """
+    """The document with a sibling node, of the same name, for each instance of EXT_mesh_gpu_instancing."""
     nodes = gltf.document.get("nodes")
     rows = nodes if isinstance(nodes, list) else []
     if _INSTANCING not in json.dumps(gltf.document.get("extensionsUsed")):
@@ -205,10 +196,7 @@ def _buffer(gltf: Gltf, index: int, fetch: Fetch) -> bytes:
 
 
 def uri_bytes(gltf: Gltf, uri: Any, place: str, fetch: Fetch) -> bytes:
-    """The bytes of a uri: of a data URI, or of a file beside the scene.
-
-    Raises MissingFile if the file does not exist, BadHouse for an invalid uri.
-    """
+    """The bytes of a data URI or a file beside the scene; MissingFile, or BadHouse for an invalid uri."""
     if not isinstance(uri, str):
         raise BadHouse(gltf.file, place, "uri is not text")
     if uri.startswith("data:"):
@@ -226,11 +214,7 @@ def uri_bytes(gltf: Gltf, uri: Any, place: str, fetch: Fetch) -> bytes:
 
 
 def image_bytes(gltf: Gltf, index: Any, fetch: Fetch) -> bytes:
-    """The encoded picture of images[index], from its buffer view, its data URI or its file.
-
-    fetch: gives files beside the scene. Raises MissingFile where its file is not there, BadHouse where the
-    document is wrong.
-    """
+    """The encoded picture of images[index]; MissingFile, or BadHouse for a wrong document."""
     image = entry(gltf, "images", index)
     if "bufferView" in image:
         return view_bytes(gltf, image["bufferView"])
@@ -238,10 +222,7 @@ def image_bytes(gltf: Gltf, index: Any, fetch: Fetch) -> bytes:
 
 
 def placed_nodes(gltf: Gltf) -> Iterator[Placed]:
-    """Every node of the default scene, parents before children.
-
-    Raises BadHouse for cycles, transforms that are not affine, and too many nodes.
-    """
+    """Every node of the default scene, parents first; BadHouse for cycles, shears or too many nodes."""
     scene = gltf.document.get("scene", 0)
     roots = _indices(gltf, entry(gltf, "scenes", scene), f"scenes[{scene}]", "nodes")
     # Visit nodes depth first, parents before children, in the file's order.
@@ -299,10 +280,7 @@ def parent_from_node(gltf: Gltf, node: dict[str, Any], index: int) -> F64:
 
 
 def numbers(gltf: Gltf, value: Any, n: int, place: str) -> F64:
-    """(n,) float64 of a JSON list of n finite numbers.
-
-    place: for messages, such as `materials[2]: colour`. Raises BadHouse for anything else.
-    """
+    """(n,) float64 of a list of n finite numbers; else BadHouse at place, such as `materials[2]: colour`."""
     fits = isinstance(value, list) and len(value) == n
     if not fits or not all(type(v) in (int, float) and abs(v) < 1e12 for v in value):
         raise BadHouse(gltf.file, place, f"expected {n} finite numbers")
@@ -310,10 +288,7 @@ def numbers(gltf: Gltf, value: Any, n: int, place: str) -> F64:
 
 
 def object_at(holder: dict[str, Any], key: str) -> dict[str, Any]:
-    """The JSON object under a key of another object; {} if absent.
-
-    Optional glTF fields may be missing, null or of another type; all of these count as absent.
-    """
+    """The JSON object under a key of another object; {} if it is absent or of another type."""
     value = holder.get(key)
     return value if isinstance(value, dict) else {}
 
@@ -325,10 +300,7 @@ def specular_glossiness(fields_json: dict[str, Any]) -> dict[str, Any]:
 
 
 def texture_slots(gltf: Gltf, material: int | None) -> dict[str, dict[str, Any]]:
-    """The supported textures of a material by their glTF key, the leading one first.
-
-    A surface has one set of texture coordinates: that of the first texture.
-    """
+    """The supported textures of a material by glTF key; the first sets the texture coordinates of all."""
     if material is None:
         return {}
     fields_json = entry(gltf, "materials", material)
@@ -367,10 +339,7 @@ def texture_set(info: dict[str, Any]) -> Any:
 
 
 def meshes_of(gltf: Gltf, index: Any, *, max_triangles: int) -> list[tuple[int | None, Mesh]]:
-    """(material number or None, mesh) of every primitive of meshes[index] that has triangles.
-
-    Raises BadHouse for damaged arrays and for more than max_triangles.
-    """
+    """(material or None, mesh) of every primitive with triangles; BadHouse for damage and over max_triangles."""
     primitives = entry(gltf, "meshes", index).get("primitives")
     if not isinstance(primitives, list) or not all(isinstance(p, dict) for p in primitives):
         raise BadHouse(gltf.file, f"meshes[{index}].primitives", "expected a list of objects")
@@ -509,10 +478,7 @@ _PRIMITIVES: Final[dict[str, Callable[[_Row], bool]]] = {
 
 
 def note_unread(gltf: Gltf, notes: Notes) -> None:
-    """A note for every extension that is not read, and for what meshes and nodes have of such.
-
-    Known extensions without an effect on the picture get none. Call it once per file.
-    """
+    """Note, once per file, each unread extension that affects the picture and what uses it."""
     used = gltf.document.get("extensionsUsed")
     for name in used if isinstance(used, list) else []:
         if name not in UNDERSTOOD and name not in _UNSEEN:

@@ -79,10 +79,7 @@ class SceneMaterials:
     def material(
         self, number: int | None, *, clear: MaterialKind
     ) -> tuple[Material, Emission | None]:
-        """(materials[number], its emission or None). None: glTF's default, white.
-
-        clear: the kind of what lets light through.
-        """
+        """(materials[number], None = white; its emission or None). clear: the kind of clear materials."""
         if number is None:
             return Material("default", is_default=True), None
         fields_json = entry(self._gltf, "materials", number)
@@ -348,10 +345,7 @@ class SceneMaterials:
             return None
 
     def with_vertex_colours(self, mesh: Mesh, material: Material) -> tuple[Mesh, Material]:
-        """The mesh and its material with the colours of its vertices, as a picture if they differ.
-
-        A material with a picture takes their mean.
-        """
+        """The mesh and material with vertex colours: their mean, or a picture if there is none."""
         if mesh.colours is None:
             return mesh, material
         base = linear_from_srgb(np.array(material.diffuse))

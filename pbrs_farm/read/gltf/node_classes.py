@@ -39,21 +39,14 @@ class Mapping:
     rows: tuple[tuple[str, NodeClass], ...] = ()
 
     def of(self, name: str) -> NodeClass | None:
-        """The class of a node's name: exact rows first, then patterns, in order.
-
-        Case counts. Patterns are a shell's (`*`, `?`, `[`); None leaves the class to the node's
-        name.
-        """
+        """The class of a node's name (case counts): exact rows first, then a shell's patterns in order; or None."""
         exact = (node_class for pattern, node_class in self.rows if pattern == name)
         alike = (node_class for pattern, node_class in self.rows if fnmatchcase(name, pattern))
         return next(chain(exact, alike), None)
 
 
 def mapping_from_json(data: bytes, file: str) -> Mapping:
-    """The mapping in a JSON file; BadHouse, naming the invalid row.
-
-    {"nodes": {"name or pattern": "class"}}; rows keep their order.
-    """
+    """The mapping `{"nodes": {"name or pattern": "class"}}`, in order; BadHouse, naming the invalid row."""
     fields_json = json_from_bytes(data, file)
     nodes = fields_json.get("nodes") if isinstance(fields_json, dict) else None
     if not isinstance(nodes, dict):
@@ -75,11 +68,7 @@ def _class_of_row(row: Any, file: str, pattern: str) -> NodeClass:
 def class_of_node(
     name: str, extras: Any, mapping: Mapping, materials: Sequence[str] = ()
 ) -> NodeClass | None:
-    """Class of a node: by its extras, else by the user's mapping, else by the words of its name.
-
-    extras: `nyu40` or `class`, and `kind`; materials: names of its materials. None if none of them is
-    conclusive.
-    """
+    """Class of a node by its extras (`nyu40`, `class`, `kind`), else the mapping, else its name; or None."""
     tagged = _tagged(extras) if isinstance(extras, dict) else None
     return tagged or mapping.of(name) or class_of_node_name(name, materials=materials)
 

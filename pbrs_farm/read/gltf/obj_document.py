@@ -28,11 +28,7 @@ _MTLLIB: Final = re.compile(rb"^mtllib[ \t]+(.+?)\s*$", re.MULTILINE)
 def gltf_of_mesh(
     data: bytes, folder: RootFolder, name: str, max_triangles: int, rgba: Sequence[float] | None
 ) -> Gltf:
-    """The document of an OBJ or STL, one node; name: of its file below the folder.
-
-    rgba: sRGB-encoded colour if it has no materials. Pictures are named from the root of the folder. Raises
-    BadHouse as parse_obj and parse_stl do.
-    """
+    """One-node document of an OBJ or STL, in rgba (sRGB) without materials; BadHouse as their parsers."""
     meshes: tuple[Mesh, ...]
     if name.lower().endswith(".stl"):
         meshes, mtl = (parse_stl(data, name, max_triangles=max_triangles),), {}

@@ -1,8 +1,4 @@
-"""Split windows, blinds and skirting off a room's mesh as separate items; no effects.
-
-Modellers draw a room with its fittings as one mesh. They are identified by names of materials and
-by connected parts; face directions do not help: a slat has faces in all directions.
-"""
+"""Split windows, blinds and skirting off a room's mesh, by materials and connected parts; no effects."""
 
 from __future__ import annotations
 

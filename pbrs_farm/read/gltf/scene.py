@@ -60,10 +60,7 @@ def companions_of_gltf(given: GivenFile, files: SourceFiles) -> str:
 
 
 def read_gltf_file(path: Path, fields: ReadFields) -> House:
-    """The House of a .glb or .gltf file with the mapping and room files beside it.
-
-    Raises BadHouse naming file and place; a name that leads out of the file's folder is rejected.
-    """
+    """The House of a .glb or .gltf with its mapping and room files; BadHouse names file and place."""
     folder = RootFolder(path.parent)
     data = folder.read(path.name, max_bytes=MAX_SCENE_BYTES)
     if data is None:
@@ -86,10 +83,7 @@ def side_files(path: Path) -> tuple[str, str]:
 
 
 def read_gltf(data: bytes, name: str, *, fields: ReadFields, beside: Beside | None = None) -> House:
-    """The House in the bytes of a scene; name: its file name.
-
-    Raises BadHouse naming the place, and when no room is given and no floor is found.
-    """
+    """The House in the bytes of a scene of that file name; BadHouse also without room and floor."""
     beside = beside or Beside()
     stem = name.rsplit(".", 1)[0]
     notes = Notes(name, strict=fields.strict)
@@ -116,10 +110,7 @@ def house_of_gltf(
     fetch: Fetch,
     rooms: bytes | None = None,
 ) -> House:
-    """The House that a document shows. stem: the name of its file without suffix.
-
-    rooms: the bytes of its room file. Raises BadHouse as read_gltf does.
-    """
+    """The House of a document. stem: of its file; rooms: bytes of its room file. BadHouse as read_gltf."""
     name, room_file = source.file, rooms
     materials = SceneMaterials(gltf, fetch, notes)
     items = list(items_of_scene(gltf, mapping, materials, notes, fields))

@@ -21,11 +21,7 @@ from pbrs_farm.read.gltf.materials import Emission
 def punctual_light(
     gltf: Gltf, node: dict[str, Any], world_from_node: F64, place: str
 ) -> LightPart | None:
-    """The point or spot light of a node; None without one, or for a directional one, which is the sun.
-
-    world_from_node: (4, 4); a light points along its -z. place: for messages. Lumens are candela times
-    the solid angle of the cone.
-    """
+    """The point or spot light of a node (along -z, lumens = candela x solid angle); None for others."""
     # A node refers to its light by number; the lights are at the top level of the file.
     number = object_at(object_at(node, "extensions"), "KHR_lights_punctual").get("light")
     lights = object_at(object_at(gltf.document, "extensions"), "KHR_lights_punctual").get("lights")
@@ -64,11 +60,7 @@ def punctual_light(
 
 
 def emitted(surfaces: Sequence[Surface], shining: dict[int, Emission]) -> tuple[LightPart, ...]:
-    """A light for every emissive surface. shining: surface -> its emission.
-
-    Surfaces of unknown strength share ASSUMED_LM by area. Others emit the file's value regardless of
-    occluders; open surfaces emit from both sides.
-    """
+    """Lights of emissive surfaces (surface -> emission); those of unknown strength share ASSUMED_LM by area."""
     # Share the assumed flux by area where the file gives no strength.
     corners = {k: corners_of_surfaces([surfaces[k]]) for k in shining}
     area = {k: float(face_areas(corners[k]).sum()) for k in shining}

@@ -1,8 +1,4 @@
-"""A Habitat scene instance -> House. Effects: reads files below its data set's folder.
-
-Stage, objects, articulated objects (URDF) and point lights are put into one glTF scene, which the glTF
-reader reads.
-"""
+"""A Habitat scene instance -> House, through one glTF scene. Reads files of its data set's folder."""
 
 from __future__ import annotations
 
@@ -403,10 +399,7 @@ def _add_robot(
 
 
 def _add_lights(dataset: _Dataset, named: Any, built: Assembly, notes: Notes) -> None:
-    """Place the point lights of a lighting config; a note counts those of other kinds.
-
-    Habitat's intensities have no unit: each light is as strong as a bulb.
-    """
+    """Place point lights, each as strong as a bulb, as Habitat's have no unit; a note counts other kinds."""
     known = dataset.template(named, "lighting") if isinstance(named, str) and named else None
     if known is None:
         return

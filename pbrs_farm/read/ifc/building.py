@@ -1,7 +1,4 @@
-"""An IFC building (.ifc, .ifczip) -> House. Effects: reads the file.
-
-Storeys are levels, spaces rooms; walls come with their openings cut. z up becomes y up.
-"""
+"""An IFC building -> House: storeys are levels, spaces rooms, walls come cut. Reads the file."""
 
 from __future__ import annotations
 
@@ -87,11 +84,7 @@ _ATTIC_WORDS: Final = ROOF_WORDS | {"attic", "dachraum", "dachboden", "loft", "Ñ
 
 
 def read_ifc(given: GivenFile, fields: ReadFields) -> House:
-    """The House of the file. Raises BadHouse naming the place.
-
-    Needs the extra with ifcopenshell: MachineFailed names the command to install it. Lengths become
-    metres, z up becomes y up.
-    """
+    """The House of the file, in metres, y up; BadHouse names the place, MachineFailed a missing ifcopenshell."""
     need("ifcopenshell")
     return _Building(given.path, fields).house()
 
@@ -457,11 +450,7 @@ class _Building:
     def _covers(
         self, rooms: Sequence[tuple[Room, F64 | None]], items: Sequence[Item], overheads: Overheads
     ) -> list[Item]:
-        """A floor or ceiling for each room without one in the building.
-
-        rooms: each with the top of its space's body, which a sloped ceiling follows. A slab is the floor
-        of the room above; its underside gets the ceiling of the room below.
-        """
+        """A floor or ceiling for each room without one; a slab below a room is its floor, above it hides a ceiling."""
         white = self._library.index(Material("", diffuse=(0.9, 0.9, 0.9), is_default=True))
         covers: list[Item] = []
         for room, top in rooms:

@@ -58,10 +58,7 @@ class Overhead:
         return float(self._within(below_y, of_ceilings=of_ceilings).mean())
 
     def height(self, below_y: float = np.inf, *, of_ceilings: bool = False) -> float | None:
-        """The nominal height of what hangs below a height: of a sloped roof its highest; None for none.
-
-        A level ceiling over half of it counts, whatever bulkheads and shadow gaps are at its edges.
-        """
+        """Height of a level ceiling over half of the room below_y, else the highest of a sloped roof; or None."""
         y = self.heights[self._within(below_y, of_ceilings=of_ceilings)]
         if not len(y):
             return None

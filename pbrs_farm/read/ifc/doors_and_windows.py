@@ -1,8 +1,4 @@
-"""Doors and windows of an IFC building: kind, hole, operation, glass.
-
-No effects. IfcRelVoidsElement relates a wall to its holes, and IfcRelFillsElement a hole to its door
-or window.
-"""
+"""Doors and windows of an IFC building: kind, hole, operation, glass; no effects."""
 
 from __future__ import annotations
 
@@ -89,11 +85,7 @@ def voids_of_walls(
     items: Mapping[str, Item],
     level_of: Callable[[float], str],
 ) -> Iterator[Void]:
-    """The holes in walls, each with the door or window that fills it, if any does; those of roof windows.
-
-    model: of ifcopenshell; meshes: by rows' numbers, of openings too; world: (4, 4) from z up; items: by id,
-    as the house has them.
-    """
+    """The holes in walls and roofs, each with its door or window if any; world: (4, 4) from z up."""
     loose = _without_records(model, items)
     for relation in model.by_type("IfcRelVoidsElement"):
         opening = relation.RelatedOpeningElement

@@ -1,7 +1,4 @@
-"""The meshes of an IFC building's products by the library, in metres, z up; no effects.
-
-The library has cut openings and joined layers already.
-"""
+"""Meshes of an IFC building's products by ifcopenshell, openings cut, in metres, z up; no effects."""
 
 from __future__ import annotations
 
@@ -53,11 +50,7 @@ class ProductMesh:
 def meshes_of_products(
     model: Any, products: Sequence[Any], file: str, fields: ReadFields
 ) -> dict[int, ProductMesh]:
-    """The mesh of each product by its row's number; one that the library fails on is not there.
-
-    model, products: of ifcopenshell. Openings are cut by the library. Raises BadHouse for more triangles
-    than read.max_triangles.
-    """
+    """Meshes by row number, without failed ones; BadHouse for more than read.max_triangles."""
     import ifcopenshell.geom
 
     settings = ifcopenshell.geom.settings()
@@ -145,11 +138,7 @@ def _mesh_of_shape(shape: Any) -> ProductMesh | None:
 
 
 def _facing_out(positions: F64, faces: I64, items: I64) -> I64:
-    """The faces, turned where they bound a closed body from inside.
-
-    items: (F,) the representation item each face comes from. A mapped item that mirrors (a right-hand
-    door made of a left-hand one) comes out of the library with its faces looking inwards.
-    """
+    """The faces, turned where a closed body (such as a mirrored mapped item) would face inwards."""
     turned = faces.copy()
     for item in np.unique(items):
         is_of_item = items == item

@@ -29,11 +29,7 @@ _NAMED: Final = ("Name", "Description", "ObjectType", "Tag", "LongName", "Elemen
 
 
 def model_of(path: Path) -> Any:
-    """The ifcopenshell.file of a .ifc or .ifczip. Raises BadHouse, naming the invalid row.
-
-    The file is checked before the library opens it, and errors of the library become BadHouse too.
-    Needs ifcopenshell.
-    """
+    """The checked ifcopenshell.file of a .ifc or .ifczip; BadHouse, naming the invalid row."""
     import ifcopenshell
 
     data = _bytes_of(path)
@@ -53,10 +49,7 @@ def model_of(path: Path) -> Any:
 
 
 def _in_known_schema(text: str, path: Path) -> str:
-    """The text with the schema of its family that the library knows. Raises BadHouse for another.
-
-    What houses are made of has the same attributes in IFC 2x, 2x2 and 2x3, and in the drafts of IFC4x3.
-    """
+    """The text with the known schema of its family (IFC 2x, 4x3 drafts ...); BadHouse for another."""
     named = _SCHEMA.search(text)
     schema = named[2].upper() if named else ""
     near = next((known_name for begins, known_name in _SCHEMAS if schema.startswith(begins)), None)

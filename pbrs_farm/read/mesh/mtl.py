@@ -40,10 +40,7 @@ class ObjMaterial:
 
 
 def parse_mtl(data: bytes) -> tuple[ObjMaterial, ...]:
-    """The materials in the order of the file; unreadable lines are skipped.
-
-    Invalid UTF-8 is replaced. Pictures are named, not opened. Repeated names are kept.
-    """
+    """The materials in the order of the file, also repeated ones; unreadable lines are skipped."""
     materials: list[ObjMaterial] = []
     fields: dict[str, object] | None = None
     for raw in text_from_bytes(data, "replace").splitlines():
@@ -156,11 +153,7 @@ def laid(mesh: Mesh, material: ObjMaterial | None) -> Mesh:
 
 @cache
 def builtin_materials() -> dict[str, ObjMaterial]:
-    """Sweet Home 3D's (Java 3D's) built-in materials by name, for models without an MTL.
-
-    The table's Kd are linear (docs/spec/sweethome3d.md section 5); those of an MTL are not.
-    Read once and kept: do not write into the answer.
-    """
+    """Sweet Home 3D's (Java 3D's) built-in materials by name, with linear Kd; cached, do not change it."""
     text = files("pbrs_farm.read.mesh").joinpath("java3d-materials.json").read_text("utf-8")
     table = {}
     for name, m in json.loads(text).items():

@@ -1,8 +1,4 @@
-"""Wavefront OBJ geometry -> triangle meshes per (group, material), fast, in numpy; no effects.
-
-Understands v, vt, vn, f with any of the four index forms and negative indices, n-gons, g, o, s,
-usemtl, mtllib and line continuations; everything else (l, p, free-form surfaces) is passed over.
-"""
+"""Wavefront OBJ -> triangle meshes per (group, material), in numpy; lines and free forms are skipped. No effects."""
 
 from __future__ import annotations
 
@@ -68,11 +64,7 @@ class _Statements:
 
 
 def parse_obj(data: bytes, file: str, *, max_triangles: int = 2_000_000) -> ObjModel:
-    """Parse OBJ bytes; file is for error messages.
-
-    Raises BadHouse for an invalid or non-finite number, a face index out of range, or more than
-    max_triangles triangles.
-    """
+    """Parse OBJ bytes; BadHouse for an invalid number or index, or more than max_triangles triangles."""
     data = data.removeprefix(BOM_UTF8)
     # Bound the work by counting lines before any is looked at.
     for key, most in ((b"\nf", max_triangles), (b"\nv ", 3 * max_triangles)):
@@ -284,10 +276,7 @@ def mesh_from_corners(
 
 
 def _first_of_each(v: I64) -> Bools:
-    """(F,) bool: no face before has the same corners; all True where most faces are their own.
-
-    A face repeated a million times looks like one and costs any tree of triangles its balance.
-    """
+    """(F,) bool: no face before has the same corners (mass copies unbalance ray trees), if many are copies."""
     _, first = np.unique(v, axis=0, return_index=True)
     is_first = np.full(len(v), 2 * len(first) > len(v))
     is_first[first] = True

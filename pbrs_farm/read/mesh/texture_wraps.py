@@ -1,8 +1,4 @@
-"""Texture coordinates of pictures that do not repeat: surfaces know repeating ones alone; no effects.
-
-A mesh is cut where its picture ends, and coordinates beyond are brought back to where a repeating picture
-shows the same texels.
-"""
+"""Cut meshes where a picture that does not repeat ends, as surfaces only know repeating ones; no effects."""
 
 from __future__ import annotations
 

@@ -13,11 +13,7 @@ MAX_EAR_CUT = 5_000
 
 
 def triangulated_corners(positions: F64, sizes: I64) -> I64:
-    """(T, 3) corner numbers of the triangles that polygons are cut into, in the polygons' order.
-
-    positions: (C, 3) the polygons' corners one after the other; sizes: (P,) corners of each.
-    Convex polygons become fans, others are ear-cut; polygons under three corners give nothing.
-    """
+    """(T, 3) corner numbers of triangles of polygons (sizes), fans if convex, else ear-cut, in order."""
     starts = np.concatenate([[0], np.cumsum(sizes)[:-1]])
     triangles: list[I64] = []
     owners: list[I64] = []

@@ -55,10 +55,7 @@ def is_endless(model: Any, geom: int) -> bool:
 
 
 def shape_of(model: Any, geom: int, half_m: F64) -> Shape | None:
-    """The triangles of a geom; None for unsupported types.
-
-    half_m: (2,) half the sides of an infinite plane.
-    """
+    """The triangles of a geom, an infinite plane with half_m (2,) sides; None for unsupported types."""
     kind, size = _TYPE(int(model.geom_type[geom])), model.geom_size[geom]
     if kind == _TYPE.mjGEOM_MESH:
         return _mesh(model, int(model.geom_dataid[geom]))

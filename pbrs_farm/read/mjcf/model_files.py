@@ -1,7 +1,4 @@
-"""List the files that a MuJoCo model references; effects: reads its XML files.
-
-MuJoCo opens files itself, so they are checked first: none may be outside the model's folder.
-"""
+"""Files that a MuJoCo model references, checked, as MuJoCo opens them itself. Reads its XML files."""
 
 from __future__ import annotations
 
@@ -24,10 +21,7 @@ _FOLDERS: Final = ("meshdir", "texturedir", "assetdir")
 
 
 def files_of_model(folder: RootFolder, name: str) -> set[str]:
-    """Names below the root of all existing files of a model, including its own.
-
-    Raises BadHouse for XML that cannot be read, and for a name that leads out of the root.
-    """
+    """Names below the root of a model's existing files; BadHouse for bad XML or a name outside the root."""
     names_read: set[str] = set()
     waiting = [(name, "")]  # with the folder that included files are named from
     while waiting:

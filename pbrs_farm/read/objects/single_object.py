@@ -80,10 +80,7 @@ def read_object(model: ObjectModel, fields: ReadFields) -> House:
 def model_surfaces(
     model: ObjectModel, notes: Notes, fields: ReadFields
 ) -> tuple[list[Surface], MaterialLibrary, str]:
-    """A model's surfaces in its file's own frame, their materials, and the digest of its files.
-
-    Raises BadHouse for a file that cannot be read or has no triangle.
-    """
+    """A model's surfaces in its own frame, their materials, the digest of its files; BadHouse if unusable."""
     with _folder_of(model) as (folder, name):
         if name.lower().endswith(".obj"):
             surfaces, library = _obj(folder, name, notes, fields)
@@ -96,11 +93,7 @@ def model_surfaces(
 
 
 def object_companions(model: ObjectModel, files: SourceFiles) -> Iterator[str]:
-    """Names below the model's root of all other files that the reader may open.
-
-    Names as in the files, normalised below the root; some may not exist. For a damaged model, the
-    names before the damage.
-    """
+    """Names below the root, maybe missing, of the other files of a model, up to any damage in it."""
     if model.entry:
         return  # in a furniture library, which is one file
     folder, name = RootFolder(model.root), model.path.relative_to(model.root).as_posix()
@@ -158,10 +151,7 @@ def _obj(
 
 
 def material_library(folder: RootFolder, name: str) -> str:
-    """The first mtllib of an OBJ as a name below the folder; `<stem>.mtl` without one.
-
-    Only searches for the line: the library may not exist. Names may contain spaces.
-    """
+    """The first mtllib of an OBJ (names may have spaces) below the folder, `<stem>.mtl` without one."""
     data = folder.read(name, max_bytes=MAX_SCENE_BYTES) or b""
     reference = posixpath.splitext(posixpath.basename(name))[0] + ".mtl"
     start = data.find(b"mtllib ")

@@ -1,7 +1,4 @@
-"""A home in URDF or SDF -> House. Effects: reads the file and its models.
-
-Links become nodes of one glTF scene for the reader of glTF. Both formats are z up, in metres.
-"""
+"""A home in URDF or SDF -> House: links become nodes of one glTF scene. Reads the file and its models."""
 
 from __future__ import annotations
 

@@ -30,10 +30,7 @@ RootsOf = Callable[[Visual], "list[int] | None"]
 def placed_links(
     built: Assembly, robot: Robot, roots_of: RootsOf, values: Mapping[str, float], scale: float
 ) -> dict[str, int]:
-    """Link -> its node, below its parent's, with its joint in the extras; {} if no shape is here.
-
-    values: of the joints, radians or metres in the world; scale: of the robot in the world.
-    """
+    """Link -> its node, below its parent's, with its joint (value, robot's scale); {} without a shape."""
     nodes = built.document.setdefault("nodes", [])
     # Nodes of assets come first: adding them moves the list on.
     shown: dict[str, list[tuple[list[int], F64]]] = {}
@@ -77,10 +74,7 @@ def roots_of_robot(robot: Robot, node_of: Mapping[str, int]) -> list[int]:
 
 
 def model_name(reference: str, folder: RootFolder, at: str) -> str:
-    """Name below the root of a model that a file inside the folder `at` names.
-
-    `package://x/y` and `model://x/y` are searched as x/y and y, beside the file and from the root.
-    """
+    """Name below the root of a model that a file in folder `at` names (`package://x/y`: x/y or y)."""
     scheme, is_uri, path = reference.rpartition("://")
     if not is_uri:
         return folder.name_from(at, reference)

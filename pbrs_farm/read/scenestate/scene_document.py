@@ -1,7 +1,4 @@
-"""A sceneState's JSON -> its architecture and objects in the world, checked; no effects.
-
-The architecture is that of SUNCG v2's arch.json; axes, units and materials come in more ways.
-"""
+"""A sceneState's JSON (like SUNCG v2's arch.json) -> its checked architecture and objects; no effects."""
 
 from __future__ import annotations
 
@@ -123,11 +120,7 @@ class SceneDocument:
 
 
 def scene_document(data: bytes, file: str, notes: Notes) -> SceneDocument:
-    """Parse a document. Raises BadHouse, naming the invalid element.
-
-    data: JSON of the Scene State format; notes: receives elements of unknown types. Lengths are
-    converted to metres.
-    """
+    """Parse a document into metres; BadHouse, naming the invalid element; unknown types are notes."""
     value = bounded_json(data, file)
     # Some exports nest the scene twice.
     for _ in range(2):

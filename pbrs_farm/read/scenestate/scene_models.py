@@ -1,7 +1,4 @@
-"""The objects of a sceneState: their models from a folder, else what its categories tell.
-
-Effect: reads <folder>/<id>.glb (also by first character, or <id>/<id>.glb) and objects.csv.
-"""
+"""The objects of a sceneState: models in <folder>/<id>.glb, else by category and objects.csv. Reads files."""
 
 from __future__ import annotations
 

@@ -39,10 +39,7 @@ class StandingWall:
 def standing_walls(
     elements: Sequence[SceneElement], floors: Mapping[str, Any]
 ) -> tuple[list[StandingWall], list[StandingWall]]:
-    """(all walls as drawn, with frames; the merged walls, each once).
-
-    floors: room -> the plan area (shapely) of its floor.
-    """
+    """(all walls as drawn, with frames; the merged walls). floors: room -> shapely area."""
     tree = shapely.STRtree(list(floors.values()))
     names = list(floors)
     drawn = [w for element in elements if (w := _stand_wall(element, tree, names)) is not None]

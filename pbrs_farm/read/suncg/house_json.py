@@ -111,10 +111,7 @@ class HouseRecord:
 
 
 def house_record(data: bytes, file: str) -> HouseRecord:
-    """The records of house.json; invalid nodes and unknown types are left out.
-
-    Raises BadHouse, naming the level and the node of an invalid value.
-    """
+    """The records of house.json without invalid nodes; BadHouse, naming level and node of a bad value."""
     hint = "a SUNCG house.json has levels, and levels have nodes"
     document = checked(_House, json_from_bytes(data, file), file, error=BadHouse, hint=hint)
     levels: dict[str, tuple[Node, ...]] = {}

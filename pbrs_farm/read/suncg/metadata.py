@@ -1,7 +1,4 @@
-"""SUNCG's metadata tables, read from the user's own root (docs/spec/suncg.md section 2); no effects.
-
-No table is shipped: where the root lacks one, the house is read without it and a note says so.
-"""
+"""SUNCG's optional metadata tables in the user's root (docs/spec/suncg.md section 2); no effects."""
 
 from __future__ import annotations
 

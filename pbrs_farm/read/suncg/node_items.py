@@ -1,7 +1,4 @@
-"""Nodes of a SUNCG house -> items placed in the world (docs/spec/suncg.md sections 1.3-1.6).
-
-Effect: reads the models and textures they name.
-"""
+"""Nodes of a SUNCG house -> placed items (docs/spec/suncg.md sections 1.3-1.6). Reads their models."""
 
 from __future__ import annotations
 
@@ -250,11 +247,7 @@ def ground_item(context: ReaderContext, node: Node) -> Item | None:
 def room_surfaces(
     context: ReaderContext, node: Node, part: str, *, default_walls: bool
 ) -> list[tuple[str, Surface]]:
-    """(group name, surface) of a room's part: f its floor, c its ceiling, w its walls.
-
-    Empty, with a note, if the part's OBJ is missing or has no faces. default_walls: its
-    materials are those of walls, white and marked as default where nobody chose one.
-    """
+    """(group, surface) of a room's floor f, ceiling c or walls w; empty, with a note, without faces."""
     base = f"room/{context.house}/{node.model_id}{part}"
     model = context.models.model(f"{base}.obj", f"{base}.mtl")
     if model is None:

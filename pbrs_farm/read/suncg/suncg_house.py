@@ -1,7 +1,4 @@
-"""A SUNCG house (v1, or v2 by its arch.json) -> House; docs/spec/suncg.md sections 1 and 2.
-
-Effects: reads files below the root.
-"""
+"""A SUNCG house (v1 or v2) -> House (docs/spec/suncg.md sections 1 and 2). Reads files of the root."""
 
 from __future__ import annotations
 
@@ -63,10 +60,7 @@ def arch_file(house_id: str) -> str:
 
 
 def suncg_companions(folder: RootFolder, house_id: str, files: SourceFiles) -> Iterator[str]:
-    """Names below the root of all other files that reading the house may open.
-
-    Some may not exist. Never raises: the reader reports faults of files.
-    """
+    """Names below the root, maybe missing, of the other files of a house; never raises."""
     for table in (*CLASS_TABLES, VARIANT_TABLE, LAMP_TABLE, LIGHT_TABLE):
         yield from table_places(table)
     yield arch_file(house_id)

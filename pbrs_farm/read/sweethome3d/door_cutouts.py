@@ -45,10 +45,7 @@ def opening_of(
     *,
     is_window: bool,
 ) -> Opening | None:
-    """The opening of a door or window, or None (with a note) outside of walls.
-
-    ids: of the opening, of its level, of its item.
-    """
+    """The opening of a door or window, or None (with a note) outside of walls. ids: of opening, level, item."""
     assert piece.frame is not None
     outlines = _outlines(piece, piece.frame, materials)
     span = _depth_span(frame, piece.frame, walls)

@@ -74,10 +74,7 @@ def stored_cameras(plan: HomePlan) -> tuple[StoredCamera, ...]:
 
 
 def check_plan_bounds(plan: HomePlan, file: str) -> None:
-    """Raise BadHouse, naming the file, for a plan with too many parts or excessive overlaps.
-
-    Hidden levels do not count.
-    """
+    """Raise BadHouse for a plan whose visible levels have too many parts or excessive overlaps."""
     walls = _by_level(plan, plan.walls)
     pieces = [p for drawn in _by_level(plan, plan.pieces).values() for p in drawn]
     n_walls = sum(map(len, walls.values()))

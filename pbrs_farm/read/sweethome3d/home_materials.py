@@ -14,10 +14,7 @@ SHININESS_SCALE = 128.0  # Phong exponent of the program's shininess 1
 
 
 class HomeMaterials:
-    """Resolves paints and textures of one home into its material library.
-
-    contents: the archive's entries, and the program's own. library, notes: of the house.
-    """
+    """Resolves paints and textures of one home (or of the program) into its material library."""
 
     def __init__(self, contents: Resources, notes: Notes) -> None:
         self.contents = contents
@@ -34,11 +31,7 @@ class HomeMaterials:
         )
 
     def painted(self, paint: Paint, name: str, place: str) -> int:
-        """Index of the material that the paint of a wall or a room makes.
-
-        A picture that can be used goes before the colour; without either the surface is white and marked
-        as default, so that repair and dressing may paint it. place: for a note on a missing picture.
-        """
+        """Index of a paint's material: its picture, else its colour, else white marked as default."""
         # A picture that can be used goes before the colour.
         loaded = None
         if paint.picture is not None:

@@ -68,10 +68,7 @@ def read_rooms(
 
 
 def rooms_between_walls(plan: HomePlan, outlines: dict[str, Outline]) -> tuple[HomeRoom, ...]:
-    """Rooms where walls of visible levels enclose something, for a plan in which none is drawn.
-
-    Gaps of ends that miss each other are closed, and rooms end at doorways; parapets and fences enclose nothing.
-    """
+    """Rooms enclosed by walls of visible levels, up to small gaps and doorways, if no room is drawn."""
     home_rooms: list[HomeRoom] = []
     for level_id in dict.fromkeys(wall.level for wall in plan.walls):
         feet = [

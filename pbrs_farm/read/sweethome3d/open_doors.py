@@ -134,10 +134,7 @@ def swung(leaf: Leaf, angle_deg: float) -> F64:
 def opening_angle(
     leaf: Leaf, frame: PieceFrame, items: Iterable[Item], walls: Iterable[StandingWall]
 ) -> float | None:
-    """The widest of ANGLES_DEG at which the leaf meets nothing; None where each of them does.
-
-    items: those of the storey but the door; their oriented boxes are asked.
-    """
+    """The widest of ANGLES_DEG at which the leaf meets no oriented box of its storey's items; or None."""
     low, high = frame.world(leaf.points)[:, 1].min(), frame.world(leaf.points)[:, 1].max()
     things = [i.oriented_box.corners for i in items if i.n_faces and not i.kind.is_structure]
     plans = [

@@ -47,9 +47,6 @@ def read_example(name: str, fields: ReadFields) -> House:
 
 
 def package_digest(package: Package | None) -> str:
-    """Digest of the package of example homes and models; "" for the tested version.
-
-    The tested version is part of a release: one that tests another raises the house step's version.
-    """
+    """Digest of the package of example homes and models; "" for the version tested with this release."""
     is_tested = package is not None and not package.note
     return "" if is_tested else keys.sha256((package.label if package else "none").encode())

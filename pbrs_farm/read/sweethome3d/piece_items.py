@@ -42,10 +42,7 @@ def piece_item(
     ids: tuple[str, str],
     rooms: list[ReadRoom],
 ) -> tuple[Item, PieceFrame] | None:
-    """The placed item and its frame, or None (with a note) if there is no model to place.
-
-    ids: of the item, of its level.
-    """
+    """The placed item (ids: its own, its level's) and its frame; None, with a note, without a model."""
     model = models.get(piece.model, piece.place, piece.transformations)
     if model is None:
         return None

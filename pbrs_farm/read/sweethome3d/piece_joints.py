@@ -93,10 +93,7 @@ def _corners_by_joint(
 
 
 def _joint(part: str, name: str, hung: F64, fixed: F64, body: F64 | None) -> Joint | None:
-    """The joint of shut faces (F, 3, 3) on a hinge or rail, in the piece's frame, in which +z is its front.
-
-    body: (F, 3, 3) from which it opens away; None of a door or window.
-    """
+    """The joint of shut faces (F, 3, 3) on a hinge or rail, +z in front. body: opens away from it, or None."""
     fixed, points = fixed.reshape(-1, 3), hung.reshape(-1, 3)
     low, high = fixed.min(0), fixed.max(0)
     along = int(np.argmax(high - low))

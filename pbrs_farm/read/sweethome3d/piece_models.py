@@ -134,10 +134,7 @@ class PieceModels:
     def get(
         self, name: str, place: str, transformations: Transformations = ()
     ) -> PieceModel | None:
-        """The model of a piece, its parts moved as the home keeps them, parsed once.
-
-        None, with a note, if it is missing or cannot be read. A model that several pieces name is parsed once.
-        """
+        """The model of a piece, parsed once and moved as the home keeps it; None, with a note, if unusable."""
         if name not in self._parsed:
             self._parsed[name] = self._load(name, place)
         parsed = self._parsed[name]
@@ -156,11 +153,7 @@ class PieceModels:
         return parsed.meshes if parsed is not None else ()
 
     def add_opened(self, name: str, moves: Transformations, out: frozenset[str]) -> Transformations:
-        """The transformations under which `get` gives the model with doors moved or left out.
-
-        out: joints whose parts are left out. Its box stays that of the shut model, which the
-        piece's size is of.
-        """
+        """Transformations for a model with doors moved or left out (out); its box stays the shut one."""
         parsed = self._parsed[name]
         assert parsed is not None
         key = (*moves, *((f"out:{joint}", ()) for joint in sorted(out)))

@@ -144,11 +144,7 @@ def _rotation_z(angle: float) -> F64:
 def light_parts(
     piece: PlanPiece, frame: PieceFrame, emitting: tuple[int, ...]
 ) -> tuple[LightPart, ...]:
-    """One part per light source; none where the lamp is switched off.
-
-    emitting: the item's surfaces that glow; they belong to the first source. A lamp whose model
-    glows but has no source gets one in the middle of its box.
-    """
+    """One light per source, none if switched off; the first, or one amid the box, has the emitting surfaces."""
     if piece.power <= 0:
         return ()
     width, height, depth = 2 * frame.half

@@ -28,10 +28,7 @@ _TRAILING_POINT: Final = re.compile(r"(?<=\d)\.(?!\d)")  # "1." is SVG, but not 
 
 
 def polygons_from_path(text: str) -> tuple[Points2, ...]:
-    """The path's closed sub-paths as (N, 2) polygons, N >= 3.
-
-    Raises ValueError for an invalid or too long path, and for coordinates beyond MAX_COORDINATE.
-    """
+    """The path's closed sub-paths as polygons (N >= 3, 2); ValueError if invalid, too long or too large."""
     segments = _segments(text)
     # Bound the number of points before any is computed.
     if sum(_n_steps(s) for s in segments) > MAX_POINTS:

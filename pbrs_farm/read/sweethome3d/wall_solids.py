@@ -31,11 +31,7 @@ def wall_items(
     materials: HomeMaterials,
     house_level: dict[str, str],
 ) -> list[Item]:
-    """An item for each wall of a visible level, each followed by its baseboards.
-
-    Solids are closed, mitred with their neighbours and without holes. outlines: by wall id; house_level:
-    the home's level id -> the house's.
-    """
+    """An item for each visible wall, closed, mitred, without holes, each followed by its baseboards."""
     items: list[Item] = []
     widened = outlines_of(tuple(_with_baseboards(w) for w in plan.walls))
     for wall in plan.walls:
@@ -61,10 +57,7 @@ def wall_items(
 
 
 def top_heights(wall: HomeWall, points: F64, along: F64) -> F64:
-    """(N,) heights above the level of the wall's top over plan points.
-
-    The top of a straight wall is a plane through its two end heights; of an arc, it follows along.
-    """
+    """(N,) heights above the level of a wall's top, planar or, of an arc, along it, over plan points."""
     low, high = wall.height, wall.height if wall.height_end is None else wall.height_end
     if wall.height_end is None or abs(wall.arc) > 1e-3:
         return np.asarray(low + (high - low) * along)

@@ -1,8 +1,4 @@
-"""Joints of UsdPhysics -> joints in the extras of a scene's nodes; no effects.
-
-A body that a joint moves is a part of its item. A body on a moving body moves along with it: its node
-is put below the other's.
-"""
+"""Joints of UsdPhysics -> joints in the extras of a scene's nodes; no effects."""
 
 from __future__ import annotations
 

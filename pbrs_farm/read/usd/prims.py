@@ -1,7 +1,4 @@
-"""Convert the prims of a composed stage to nodes of a glTF document in metres, y up; no effects.
-
-The glTF reader makes items of them. Properties of a prim become the node's extras.
-"""
+"""Prims of a composed stage as nodes of a glTF document in metres, y up, properties as extras; no effects."""
 
 from __future__ import annotations
 
@@ -295,10 +292,7 @@ class StageNodes:
         return next(filter(None, (self._shaders.uv_name(m) for m in materials if m)), "")
 
     def _bound_material(self, prim: Any) -> Any:
-        """The material for full renders, else the one for all purposes.
-
-        The preview material if it is the only supported one.
-        """
+        """The material for full renders, else for all purposes, else a supported preview material."""
         binding = UsdShade.MaterialBindingAPI(prim)
         full = binding.ComputeBoundMaterial(UsdShade.Tokens.full)[0]
         if full and self._shaders.is_understood(full):

@@ -537,10 +537,7 @@ class Shaders:
         return self._pictures[key]
 
     def picture(self, number: int, read: Callable[[Any], bytes | None]) -> bytes | None:
-        """The bytes of a picture by its number; read: those of an asset, None where it is not there.
-
-        Raises ValueError with the reason where a picture that has to be made of two cannot be.
-        """
+        """The bytes of a picture by number (read: of an asset, or None); ValueError if two cannot be combined."""
         asset = self.assets[number]
         if not isinstance(asset, _Masked):
             return _bytes_of(asset, read)

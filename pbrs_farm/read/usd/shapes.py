@@ -40,10 +40,7 @@ class Shape:
 
 
 def mesh_shape(prim: Any, time: Any, file: str, uv_name: str = "") -> Shape | None:
-    """The triangles of a UsdGeom.Mesh; None without any. BadHouse for a damaged mesh.
-
-    uv_name: the texture coordinates of its material.
-    """
+    """The triangles of a UsdGeom.Mesh with the coordinates uv_name; None without any; BadHouse for damage."""
     mesh = UsdGeom.Mesh(prim)
     points = _float_rows(mesh.GetPointsAttr().Get(time), 3)
     sizes = _ints(mesh.GetFaceVertexCountsAttr().Get(time))
@@ -206,10 +203,7 @@ def _of_surface(surface: Surface) -> Shape:
 
 
 def light_shape(prim: Any, time: Any) -> Shape | None:
-    """The shining surface of a light of UsdLux that has a flat or long one; None of others.
-
-    Rectangles and discs shine along -z, cylinders lie along x.
-    """
+    """The surface of a UsdLux light: rectangles and discs shine along -z, cylinders lie along x; or None."""
     if prim.IsA(UsdLux.RectLight):
         w, h = (
             float(prim.GetAttribute(f"inputs:{n}").Get(time) or 1) / 2 for n in ("width", "height")

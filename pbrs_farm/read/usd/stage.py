@@ -1,7 +1,4 @@
-"""An OpenUSD stage (.usd, .usda, .usdc, .usdz) -> House. Effects: reads files.
-
-The composed stage is brought to the reader of glTF: prims are its nodes, labels its classes.
-"""
+"""An OpenUSD stage (.usd, .usda, .usdc, .usdz) -> House, through the glTF reader. Reads files."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""The layers of an OpenUSD stage and files beside them; only files inside the folder are read.
-
-Effects: reads files below one folder; opens the stage first in a process that may crash, then in this one.
-"""
+"""The layers of a stage and files beside them, inside one folder; opened in a process first, as USD may crash."""
 
 from __future__ import annotations
 
@@ -70,10 +67,7 @@ class StageFolder:
 
 
 def files_of_stage(folder: StageFolder) -> Iterator[tuple[str, bool]]:
-    """(name below the root, whether it is a layer) of each file that the stage may open.
-
-    Raises BadHouse for a layer that leads out of the folder, or is no regular file.
-    """
+    """(name below the root, whether it is a layer) of files that the stage may open; BadHouse if outside."""
     first = folder.name_of(str(folder.path))
     assert first is not None
     visited, todo = {first}, [first]

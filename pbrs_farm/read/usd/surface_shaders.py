@@ -65,10 +65,7 @@ _CONTEXTS: Final = ("", "mtlx")  # render contexts in order of preference, the s
 
 
 def surface_of(material: Any) -> tuple[Any, SurfaceWords | None]:
-    """(surface shader of a UsdShade.Material, its input names), or (shader, None) if unsupported.
-
-    (None, None) without any shader.
-    """
+    """(surface shader or None of a UsdShade.Material, its input names or None if it is unsupported)."""
     first = None
     outputs = (o.GetBaseName().rpartition(":")[0] for o in material.GetSurfaceOutputs())
     for context in dict.fromkeys((*_CONTEXTS, *outputs)):

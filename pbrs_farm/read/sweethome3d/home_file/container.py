@@ -28,10 +28,7 @@ _PROGRAM_FOLDERS: Final = (
 
 @dataclass(frozen=True, slots=True)
 class Container:
-    """The root element <home>, and the source of models and textures.
-
-    parsed: models already in memory, by content name: those of a home just generated.
-    """
+    """The root element <home>, and its models and textures. parsed: models of a home just generated."""
 
     root: Element
     contents: Resources
@@ -58,10 +55,7 @@ class _WebResources:
 
 
 def open_container(data: bytes, file: str, resources: Resources | None) -> Container:
-    """Open a home file; resources: the program's own models, for files that refer to them.
-
-    Raises BadHouse for an unsafe file, one without Home.xml, and any other than zip or XML.
-    """
+    """Open a zip or XML (resources: the program's models); BadHouse if unsafe or without Home.xml."""
     if data.startswith(b"PK"):
         archive = ZipResources(data, file)
         xml = archive.read("Home.xml")

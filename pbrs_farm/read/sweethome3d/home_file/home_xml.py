@@ -1,7 +1,4 @@
-"""Values of a Home.xml in metres and radians; no effects.
-
-Plan points are (x, y) of the file = (x, z) of the world. Colours are sRGB-encoded 0..1.
-"""
+"""Values of a Home.xml in metres, radians and sRGB 0..1; its (x, y) is the world's (x, z). No effects."""
 
 from __future__ import annotations
 

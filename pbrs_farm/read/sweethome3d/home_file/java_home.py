@@ -46,10 +46,7 @@ _TAGS: Final = {
 
 
 def root_from_java(data: bytes, file: str) -> Element:
-    """The element <home> of a serialised Home.
-
-    Raises BadHouse for a damaged stream, or one whose object is no home.
-    """
+    """The element <home> of a serialised Home; BadHouse for a damaged stream or another object."""
     try:
         objects = java_objects(data)
     except JavaStreamError as error:

@@ -62,10 +62,7 @@ _ENDED: Final = _End()
 
 
 def java_objects(data: bytes) -> list[Any]:
-    """The top-level contents of a stream: JavaObject, list, str, bytes or None; enums are str.
-
-    Raises JavaStreamError for damaged, too deep or too large streams, and for proxies.
-    """
+    """Top-level contents: JavaObject, list, str (enums, too), bytes or None; JavaStreamError if damaged."""
     if len(data) > MAX_STREAM_BYTES:
         raise JavaStreamError(f"{len(data)} bytes, at most {MAX_STREAM_BYTES} are read")
     if not data.startswith(_MAGIC):

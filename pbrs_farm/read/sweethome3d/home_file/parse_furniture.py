@@ -14,11 +14,7 @@ FULL_CUT_OUT = "M0,0 v1 h1 v-1 z"  # the unit square: the whole opening
 
 
 def parse_piece(a: Attributes, level: str, group: str = "") -> PlanPiece:
-    """One piece of furniture, door, window, light or shelf unit, by its XML element.
-
-    level: id of its level, or of the group's that holds it. group: the group's name, "" for none. Raises
-    BadHouse naming the element.
-    """
+    """A piece by its XML element, of a level (its own or its group's) and a group or ""; BadHouse."""
     element = a.element
     return PlanPiece(
         tag=element.tag,

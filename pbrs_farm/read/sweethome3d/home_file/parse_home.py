@@ -28,11 +28,7 @@ FALLBACK_HEIGHT_M = 2.5  # of walls and levels without a height
 
 
 def parse_plan(root: Element, file: str, max_extent_m: float) -> HomePlan:
-    """All elements of a home's XML used by the pipeline, as values in metres and radians.
-
-    max_extent_m: largest allowed coordinate (read.max_extent_m). Raises BadHouse, naming the invalid
-    element.
-    """
+    """All used elements of a home, metres and radians; BadHouse, also for coordinates over max_extent_m."""
     home = Attributes(file, "home", root, max_extent_m)
     # Bound the work before any element is read.
     for tag, most in (

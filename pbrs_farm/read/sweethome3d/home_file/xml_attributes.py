@@ -22,10 +22,7 @@ class Attributes:
     max_extent_m: float  # bound of lengths and coordinates
 
     def fail(self, message: str) -> BadHouse:
-        """The error that names the file and this element.
-
-        To be raised by the caller: `raise a.fail("has no points")`.
-        """
+        """The error that names the file and this element, for the caller to raise."""
         return BadHouse(self.file, self.place, message)
 
     def text(self, name: str, default: str = "") -> str:
