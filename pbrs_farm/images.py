@@ -50,11 +50,15 @@ _TEXTURE_KINDS: Final = (".png", ".jpg", ".gif", ".bmp", ".tga")
 
 
 def png_from_array(
-    array: NDArray[np.uint8] | NDArray[np.uint16], *, attribution: str = ""
+    array: NDArray[np.uint8] | NDArray[np.uint16],
+    *,
+    attribution: str = "",
+    texts: Mapping[str, str] | None = None,
 ) -> bytes:
     """PNG bytes of (H, W) or (H, W, 3 or 4) uint8 or uint16, without an added alpha or timestamp.
 
-    8-bit colour is tagged as sRGB, everything else as data. attribution: the file's copyright.
+    8-bit colour is tagged as sRGB, everything else as data. attribution: the file's copyright. texts: keyword
+    -> value of further text chunks.
     """
     channels = _channels(array, (1, 3, 4))
     if array.dtype not in (np.uint8, np.uint16):
@@ -68,6 +72,8 @@ def png_from_array(
     spec["oiio:UnassociatedAlpha"] = 1  # store colours without multiplying them by alpha
     if attribution:
         spec["Copyright"] = attribution
+    for keyword, value in (texts or {}).items():
+        spec[keyword] = value
     return _encoded(array, spec, ".png")
 
 

@@ -258,6 +258,13 @@ def depth_within_png(view: ChosenView) -> NDArray[np.uint16]:
     return np.where(depth < np.iinfo(np.uint16).max, depth, np.uint16(0))
 
 
+def depth_metres(view: ChosenView) -> NDArray[np.float64]:
+    """(H, W) float64 metres: of `depth_z` if it is exported, else of depth.png; 0 for nothing or out of its range."""
+    if view.has("depth_z"):
+        return view.array("depth_z").astype(np.float64)
+    return depth_within_png(view) / 1000
+
+
 def opengl_normals(view: ChosenView, layer: str = "normal") -> NDArray[np.float32]:
     """(H, W, 3) unit normals, camera x right, y up, z backward; (0, 0, 0) for nothing.
 

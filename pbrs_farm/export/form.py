@@ -36,13 +36,11 @@ class Convention:
     """Pixel origin, axes and depth of a form: a row of the table in docs/formats/export.md.
 
     first_pixel: x and y of the first pixel's centre in K and in pixel coordinates: 0.5 as in view.json,
-    0 for readers that count from the centre; None for a form with neither. has_k: True if the form's
-    files have K, or focal lengths and principal point. axes: of poses, normals and points. depth: its
+    0 for readers that count from the centre; None for a form with neither. axes: of poses, normals and points. depth: its
     unit and direction; "" for no depth.
     """
 
     first_pixel: float | None
-    has_k: bool
     axes: str
     depth: str = ""
 
@@ -50,9 +48,8 @@ class Convention:
     def row(self) -> str:
         """The cells of its row, joined."""
         centre = self.first_pixel
-        k = "as view.json" if centre == 0.5 else f"cx, cy less {0.5 - (centre or 0):g}"
         pixel = "-" if centre is None else f"({centre:g}, {centre:g})"
-        return " | ".join((pixel, k if self.has_k else "-", self.axes or "-", self.depth or "-"))
+        return " | ".join((pixel, self.axes or "-", self.depth or "-"))
 
 
 @dataclass(frozen=True, slots=True)
@@ -189,7 +186,7 @@ def forms_table(of: str) -> str:
 
 def conventions_table() -> str:
     """The conventions of the package's forms of views, as a Markdown table."""
-    rows = ["| form | centre of the first pixel | K | axes | depth |", "|---|---|---|---|---|"]
+    rows = ["| form | centre of the first pixel | axes | depth |", "|---|---|---|---|"]
     for name in FORMS.own_names():
         convention = getattr(form_of(name), "convention", None)
         if convention is not None:

@@ -278,6 +278,6 @@ FORM = ViewForm(
     " `scene_gt_coco.json`; a scene is a home; (0, 0) of K is the centre of the first pixel",
     lenses=("pinhole",),
     convention=Convention(
-        0, has_k=True, axes="camera x right, y down, z forward; mm", depth="mm, along the axis"
+        0, axes="camera x right, y down, z forward; mm", depth="mm, along the axis"
     ),
 )

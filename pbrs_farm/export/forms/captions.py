@@ -267,5 +267,5 @@ FORM = ViewForm(
     "`captions.jsonl`, a line a view: `file_name` (`images/<house>/<view>.png`), `text` in plain"
     " English, `objects` (`id`, `noun`, `box2d`), `relations` (`subject`, `relation`, `object` by id)",
     has_classes=True,
-    convention=Convention(0.5, has_k=False, axes=""),
+    convention=Convention(0.5, axes=""),
 )

@@ -91,7 +91,6 @@ FORM = ViewForm(
     has_classes=True,
     convention=Convention(
         0,
-        has_k=True,
         axes="camera x right, y up, z backward; the home's world, y up, m",
         depth="m, along the axis (`depth` unless pin-hole)",
     ),

@@ -24,6 +24,7 @@ from pbrs_farm.core.lighting import GROUPS_OF_MODE, Group, Mode
 from pbrs_farm.export.chosen_view import (
     Choice,
     ChosenView,
+    depth_metres,
     intrinsics_of,
     opengl_normals,
     require_lens,
@@ -200,10 +201,7 @@ def _frame(view: ChosenView) -> dict[tuple[str, str], NDArray[Any] | bytes]:
 
 
 def _geometry(view: ChosenView) -> dict[str, NDArray[Any]]:
-    depth, instance = view.array("depth"), view.array("instance")
-    z = np.where(depth < np.iinfo(np.uint16).max, depth, 0) / 1000
-    if view.has("depth_z"):
-        z = view.array("depth_z").astype(np.float64)
+    z, instance = depth_metres(view), view.array("instance")
     i, is_visible = intrinsics_of(view.facts), z > 0
     along = np.where(is_visible, z * hypersim.ray_lengths(i), np.nan)
     semantic = view.array("semantic") if view.choice.classes is None else None
@@ -373,9 +371,6 @@ FORM = ViewForm(
     lenses=("pinhole",),
     reads_radiance=True,
     convention=Convention(
-        0.5,
-        has_k=True,
-        axes="camera x right, y up, z backward; world z up, m",
-        depth="m, along the ray",
+        0.5, axes="camera x right, y up, z backward; world z up, m", depth="m, along the ray"
     ),
 )

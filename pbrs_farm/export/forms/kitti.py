@@ -113,9 +113,6 @@ FORM = ViewForm(
     lenses=("pinhole",),
     layers=("disparity", "flow_forward"),
     convention=Convention(
-        0,
-        has_k=True,
-        axes="left camera x right, y down, z forward; m",
-        depth="256 steps a px of disparity",
+        0, axes="left camera x right, y down, z forward; m", depth="256 steps a px of disparity"
     ),
 )

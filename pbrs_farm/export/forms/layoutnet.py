@@ -134,5 +134,5 @@ FORM = ViewForm(
     " turned upright and along the walls), `label_cor/<house>__<view>.txt` (`x y` of ceiling and floor of"
     " each corner in turn)",
     lenses=("equirect",),
-    convention=Convention(0.0, has_k=False, axes=""),
+    convention=Convention(0.0, axes=""),
 )

@@ -180,7 +180,6 @@ FORM = ViewForm(
     options=LidarOptions,
     convention=Convention(
         None,
-        has_k=False,
         axes="scanner x forward, y left, z up, m; poses in the home's world, y up",
         depth="m, along the beam",
     ),

@@ -129,6 +129,6 @@ FORM = ViewForm(
     finish=name_lists_by_split,
     lenses=("pinhole", "radtan"),
     convention=Convention(
-        None, has_k=False, axes="camera x right, y up, z backward", depth="mm, along the axis"
+        None, axes="camera x right, y up, z backward", depth="mm, along the axis"
     ),
 )

@@ -93,7 +93,6 @@ FORM = ViewForm(
     lenses=tuple(_MODELS),
     convention=Convention(
         0.5,
-        has_k=True,
         axes="camera x right, y up, z backward; world z up, m",
         depth="mm, along the axis (of a fisheye or panorama along the ray)",
     ),

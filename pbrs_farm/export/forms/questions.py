@@ -196,5 +196,5 @@ FORM = ViewForm(
     " (a record a question, as LLaVA and SIMS-V train on), `refs.json` and `instances.json` (phrases"
     " that fit a single item, as RefCOCO), `blind_scores.csv`; `pbrs_farm/<scene_name>.png`, of walks `.mp4`",
     has_classes=True,
-    convention=Convention(0.5, has_k=False, axes=""),
+    convention=Convention(0.5, axes=""),
 )

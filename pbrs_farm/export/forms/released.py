@@ -85,7 +85,6 @@ FORM = ViewForm(
     lenses=("pinhole",),
     convention=Convention(
         None,
-        has_k=False,
         axes="eye, towards, up in the home's world, y up, m; half angles",
         depth="mm, along the axis",
     ),

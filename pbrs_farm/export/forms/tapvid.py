@@ -80,7 +80,5 @@ FORM = ViewForm(
     "`tapvid.pkl` as TAP-Vid's DAVIS: house id -> `video`, `points` (N, T, 2) as shares of width and height,"
     " `occluded` (N, T); for films rendered with `--tracks`",
     is_of_frames=True,
-    convention=Convention(
-        0.5, has_k=False, axes="x right, y down from the upper left corner, 0..1"
-    ),
+    convention=Convention(0.5, axes="x right, y down from the upper left corner, 0..1"),
 )

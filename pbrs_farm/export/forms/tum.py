@@ -83,7 +83,6 @@ FORM = ViewForm(
     is_of_frames=True,
     convention=Convention(
         None,
-        has_k=False,
         axes="camera x right, y down, z forward; the home's world, y up, m",
         depth="5000 steps a metre, along the axis",
     ),

@@ -42,5 +42,5 @@ FORM = ViewForm(
     " `<layer>.png` / `.exr`; equal views give equal bytes",
     options=WebDatasetOptions,
     has_classes=True,
-    convention=Convention(0.5, has_k=True, axes="as view.json", depth="as view.json"),
+    convention=Convention(0.5, axes="as view.json", depth="as view.json"),
 )

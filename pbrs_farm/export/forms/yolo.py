@@ -123,5 +123,5 @@ FORM = ViewForm(
     " folder, and a comment and the command say so. `left_out.txt` names views without a picture",
     has_classes=True,
     finish=write_data_yaml,
-    convention=Convention(0.5, has_k=False, axes="shares of the picture, from its corner"),
+    convention=Convention(0.5, axes="shares of the picture, from its corner"),
 )

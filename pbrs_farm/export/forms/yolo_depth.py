@@ -47,7 +47,5 @@ FORM = ViewForm(
     " `yolo depth train data=data.yaml`",
     finish=write_depth_yaml,
     lenses=("pinhole", "radtan"),
-    convention=Convention(
-        None, has_k=False, axes="", depth="mm (`depth_scale: 1000`), along the axis"
-    ),
+    convention=Convention(None, axes="", depth="mm (`depth_scale: 1000`), along the axis"),
 )

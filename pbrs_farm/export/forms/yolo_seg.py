@@ -39,5 +39,5 @@ FORM = ViewForm(
     " each hole and further part, around it and back",
     has_classes=True,
     finish=write_data_yaml,
-    convention=Convention(0.5, has_k=False, axes="shares of the picture, from its corner"),
+    convention=Convention(0.5, axes="shares of the picture, from its corner"),
 )

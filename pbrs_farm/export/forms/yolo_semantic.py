@@ -50,5 +50,5 @@ FORM = ViewForm(
     " `yolo semantic train data=data.yaml`",
     has_classes=True,
     finish=write_semantic_yaml,
-    convention=Convention(None, has_k=False, axes=""),
+    convention=Convention(None, axes=""),
 )
