@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Final
 
 from pbrs_farm.assets import furniture_package, homes_package
-from pbrs_farm.assets.debian import cache_folder, write_whole
+from pbrs_farm.assets.debian import DebFiles, cache_folder, write_whole
 from pbrs_farm.core import keys
 from pbrs_farm.core.plugins import plugin, plugin_homes, plugins
 from pbrs_farm.core.recipe import CAMERA_SOURCES, Recipe
@@ -63,9 +63,9 @@ def upload(store: Store, refs: Sequence[SourceRef]) -> None:
             store.put_if_absent(place, Path(path).read_bytes())
     # Homes take furniture from the examples' package: workers need it too.
     if any(_uses_packages(ref) for ref in refs):
-        _upload_package(store, homes_package.PACKAGE)
+        _upload_package(store, homes_package.FILES)
     if any(has_own_furniture(ref) for ref in refs):
-        _upload_package(store, furniture_package.PACKAGE)
+        _upload_package(store, furniture_package.FILES)
 
 
 def _uses_packages(ref: SourceRef) -> bool:
@@ -102,10 +102,12 @@ def needed_plugins(
     return tuple(dict.fromkeys(plugin(group, name).mark for group, name in named))
 
 
-def _upload_package(store: Store, package: str) -> None:
-    for deb in sorted(cache_folder().glob(f"{package}_*.deb")):
-        if store.head(FOLDER + _key_name(deb.name)) is None:
-            store.put_if_absent(FOLDER + _key_name(deb.name), deb.read_bytes())
+def _upload_package(store: Store, files: DebFiles) -> None:
+    for path in files.cached_files():
+        names = path.relative_to(cache_folder()).parts
+        key = FOLDER + "/".join(map(_key_name, names))
+        if store.head(key) is None:
+            store.put_if_absent(key, path.read_bytes())
 
 
 def is_left_in_place(ref: SourceRef) -> bool:
@@ -138,7 +140,7 @@ def upload_catalogue(store: Store, recipe: Recipe) -> Recipe:
 
     catalogue_of(recipe.dress)
     if GENERATED not in recipe.dress.catalogue.split(":"):
-        _upload_package(store, furniture_package.PACKAGE)
+        _upload_package(store, furniture_package.FILES)
     # placed: key in the store -> local path; what maps to itself stays where it is.
     placed = placed_catalogue(recipe.dress.catalogue)
     for key, path in placed.items():
@@ -195,13 +197,14 @@ def fill_cache(store: Store, *, with_furniture: bool = False) -> None:
     The example homes' package, and the furniture's where a house is dressed or made.
     """
     # Download only missing packages.
-    packages = [homes_package.PACKAGE] if homes_package.cached() is None else []
+    packages = [homes_package.FILES] if homes_package.cached() is None else []
     if with_furniture and not has_furniture():
-        packages.append(furniture_package.PACKAGE)
-    for key in store.list(FOLDER) if packages else ():
+        packages.append(furniture_package.FILES)
+    # A note says that the files are there: notes sort after them.
+    for key in sorted(store.list(FOLDER)) if packages else ():
         name = key.removeprefix(FOLDER)
-        if name.endswith(".deb") and name.partition("_")[0] in packages:
-            cache_folder().mkdir(parents=True, exist_ok=True)
+        if any(files.has_file(name) for files in packages):
+            (cache_folder() / name).parent.mkdir(parents=True, exist_ok=True)
             write_whole(cache_folder() / name, store.get(key))
 
 

@@ -13,11 +13,12 @@ import hashlib
 import io
 import lzma
 import os
+import re
 import shutil
 import subprocess
 import tarfile
 import tempfile
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
 from pathlib import Path
@@ -27,6 +28,7 @@ from pbrs_farm.assets.pinned_packages import PINS, download_pinned
 from pbrs_farm.core.errors import MachineFailed
 
 APT_TIMEOUT_S: Final = 600  # of one download
+_NOTE: Final = ".sha256"  # ending of the file beside a package that holds its hash
 
 
 def cache_folder() -> Path:
@@ -64,12 +66,74 @@ class Deb:
         return MachineFailed(f"{self.path}: {why}", hint="delete the file and fetch it again")
 
 
-def cached_deb(package: str, tested_version: str, folder: Path | None = None) -> Deb | None:
-    """The cached package, the tested version if there is a choice; None if `fetch` has to be run."""
-    # The tested version goes last, where it is taken.
-    debs = sorted((folder or cache_folder()).glob(f"{package}_*.deb"))
-    debs.sort(key=lambda p: version_of(p) == tested_version)
-    return _deb(package, tested_version, debs[-1]) if debs else None
+@dataclass(frozen=True, slots=True)
+class DebFiles:
+    """Files of a package. The cache keeps them unpacked, and of the package its version and hash."""
+
+    package: str
+    tested_version: str
+    endings: Mapping[str, str]  # path in the package -> end of its name in the cache
+
+    def cached(self, folder: Path | None = None) -> Deb | None:
+        """The cached package, unpacked, the tested version if there is a choice; None if `fetch` has to be run."""
+        debs = self._debs(folder or cache_folder())
+        return self._unpacked(debs[-1]) if debs else None
+
+    def fetch(self, folder: Path | None = None) -> Deb:
+        """The package from the cache, else downloaded, unpacked; MachineFailed as of `fetched_deb`."""
+        deb = self.cached(folder)
+        return deb or self._unpacked(fetched_deb(self.package, self.tested_version, folder))
+
+    def places(self, deb: Deb) -> dict[str, Path]:
+        """Path in the package -> file in the cache, under the hash: another version never reads an older one's."""
+        start = deb.path.parent / f"{self.package}-{deb.sha256[:16]}"
+        return {path: Path(f"{start}{ending}") for path, ending in self.endings.items()}
+
+    def cached_files(self) -> list[Path]:
+        """Files of the cached package, the one that shows that it is whole last; none if it is not cached."""
+        debs = self._debs(cache_folder())
+        if not debs or debs[-1].path.exists():
+            return [deb.path for deb in debs[-1:]]
+        return [*self.places(debs[-1]).values(), _note_of(debs[-1].path)]
+
+    def has_file(self, name: str) -> bool:
+        """True if a path below a cache may be one of `cached_files`."""
+        endings = "|".join(map(re.escape, self.endings.values()))
+        unpacked = rf"-[0-9a-f]{{16}}({endings})"
+        own = re.escape(self.package)
+        return re.fullmatch(rf"{own}(_[^/]+\.deb(\.sha256)?|{unpacked})", name) is not None
+
+    def _debs(self, folder: Path) -> list[Deb]:
+        paths = {
+            path.with_name(path.name.removesuffix(_NOTE))
+            for path in folder.glob(f"{self.package}_*.deb*")
+        }
+        # The tested version goes last, where it is taken.
+        ordered = sorted(paths, key=lambda p: (version_of(p) == self.tested_version, p))
+        debs = [_deb(self.package, self.tested_version, path) for path in ordered]
+        return [deb for deb in debs if deb.path.exists() or self._is_unpacked(deb)]
+
+    def _is_unpacked(self, deb: Deb) -> bool:
+        return bool(deb.sha256) and all(path.exists() for path in self.places(deb).values())
+
+    def _unpacked(self, deb: Deb) -> Deb:
+        if self._is_unpacked(deb):
+            return deb
+        try:
+            files = deb.members(self.endings.__contains__)
+        except MachineFailed:
+            if self._is_unpacked(deb):  # by another process
+                return deb
+            raise
+        missing = self.endings.keys() - files
+        if missing:
+            raise deb.damaged(f"has no {', '.join(sorted(missing))}")
+        for path, place in self.places(deb).items():
+            place.parent.mkdir(exist_ok=True)
+            write_whole(place, files[path])
+        if _note_of(deb.path).exists():
+            deb.path.unlink(missing_ok=True)
+        return deb
 
 
 def fetched_deb(package: str, tested_version: str, folder: Path | None = None) -> Deb:
@@ -79,8 +143,11 @@ def fetched_deb(package: str, tested_version: str, folder: Path | None = None) -
     """
     folder = folder or cache_folder()
     try:
-        cached = cached_deb(package, tested_version, folder)
-        return cached or _download_into(package, tested_version, folder)
+        debs = sorted(folder.glob(f"{package}_*.deb"))
+        debs.sort(key=lambda p: version_of(p) == tested_version)
+        if debs:
+            return _deb(package, tested_version, debs[-1])
+        return _download_into(package, tested_version, folder)
     except OSError as error:
         hint = "set PBRS_CACHE to a writable folder"
         raise MachineFailed(f"{folder}: {error.strerror or error}", hint=hint) from None
@@ -120,27 +187,41 @@ def fetch_deb(package: str, tested_version: str, scratch: Path) -> None:
 
 
 def _deb(package: str, tested_version: str, path: Path) -> Deb:
-    # Hash a file once a process: a job of many homes asks for its package with each.
-    status, version, note = path.stat(), version_of(path), ""
+    version, note = version_of(path), ""
     if version != tested_version:
         note = f"{package} {version} is not the tested version {tested_version}"
+    if not path.exists():  # unpacked
+        return Deb(package, version, path, "".join(_noted(path)[:1]), note)
+    # Hash a file once a process: a job of many homes asks for its package with each.
+    status = path.stat()
     return Deb(
         package, version, path, cached_sha256(path, status.st_size, status.st_mtime_ns), note
     )
 
 
+def _note_of(path: Path) -> Path:
+    return path.with_name(f"{path.name}{_NOTE}")
+
+
+def _noted(path: Path) -> list[str]:
+    """Hash, size and date of a package from the note beside it; [] without a note."""
+    try:
+        words = _note_of(path).read_text("ascii", "replace").split()
+    except OSError:
+        return []
+    return words if len(words) == 3 else []
+
+
 @lru_cache(maxsize=16)
 def cached_sha256(path: Path, size: int, mtime_ns: int) -> str:
     # Keep the hash beside the file, under its size and date: a hundred megabytes take a while.
-    note, cached = path.with_name(f"{path.name}.sha256"), [""]
-    with contextlib.suppress(OSError):
-        cached = note.read_text("ascii", "replace").split()
-    if len(cached) == 3 and cached[1:] == [str(size), str(mtime_ns)]:
-        return cached[0]
+    noted = _noted(path)
+    if noted[1:] == [str(size), str(mtime_ns)]:
+        return noted[0]
     with path.open("rb") as file:
         sha256 = hashlib.file_digest(file, "sha256").hexdigest()
     with contextlib.suppress(OSError):  # works without a writable cache
-        write_whole(note, f"{sha256} {size} {mtime_ns}\n".encode())
+        write_whole(_note_of(path), f"{sha256} {size} {mtime_ns}\n".encode())
     return sha256
 
 

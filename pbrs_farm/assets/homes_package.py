@@ -10,7 +10,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
-from pbrs_farm.assets.debian import Deb, cached_deb, fetched_deb, write_whole
+from pbrs_farm.assets.debian import Deb, DebFiles
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.shown_text import hint_of_choice
 
@@ -111,10 +111,13 @@ class JarResources:
             return None
 
 
+FILES: Final = DebFiles(PACKAGE, TESTED_VERSION, {JAR: ".jar"})
+
+
 def cached(cache: Path | None = None) -> Package | None:
     """The cached package of example homes and models, or None; no network."""
-    deb = cached_deb(PACKAGE, TESTED_VERSION, cache)
-    return _unpacked(deb) if deb else None
+    deb = FILES.cached(cache)
+    return _package(deb) if deb else None
 
 
 def fetch(cache: Path | None = None) -> Package:
@@ -122,15 +125,8 @@ def fetch(cache: Path | None = None) -> Package:
 
     Raises MachineFailed, with the command to type, where apt cannot give it.
     """
-    return _unpacked(fetched_deb(PACKAGE, TESTED_VERSION, cache))
+    return _package(FILES.fetch(cache))
 
 
-def _unpacked(deb: Deb) -> Package:
-    jar = deb.path.parent / f"{PACKAGE}-{deb.sha256[:16]}.jar"
-    if not jar.exists():
-        # Unpack the jar under its package's hash.
-        files = deb.members(lambda name: name == JAR)
-        if JAR not in files:
-            raise deb.damaged(f"has no {JAR}")
-        write_whole(jar, files[JAR])
-    return Package(deb.version, deb.sha256, jar, deb.note)
+def _package(deb: Deb) -> Package:
+    return Package(deb.version, deb.sha256, FILES.places(deb)[JAR], deb.note)

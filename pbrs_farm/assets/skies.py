@@ -32,4 +32,5 @@ def fetch_skies() -> Path:
     folder.mkdir(parents=True, exist_ok=True)
     for path, data in files.items():
         write_whole(folder / Path(path).name, data)
+    deb.path.unlink(missing_ok=True)
     return folder

@@ -47,7 +47,7 @@ def catalogue_of_words(words: str) -> Catalogue:
     stamps = tuple((Path(word), _stamp(Path(word))) for word in paths if word != GENERATED)
     if GENERATED in paths:
         return _catalogue(stamps, None)
-    return _catalogue(stamps, furniture_package.PACKAGE in _cached_names())
+    return _catalogue(stamps, has_furniture())
 
 
 def own_catalogue(paths: Sequence[Path]) -> Catalogue:
@@ -61,13 +61,8 @@ def own_catalogue(paths: Sequence[Path]) -> Catalogue:
 
 
 def has_furniture() -> bool:
-    """True if the furniture package is cached; does not read it."""
-    return furniture_package.PACKAGE in _cached_names()
-
-
-def _cached_names() -> frozenset[str]:
-    folder = cache_folder()
-    return frozenset(p.name.split("_")[0] for p in folder.glob("*.deb"))
+    """True if the furniture package is cached; does not unpack it."""
+    return bool(furniture_package.FILES.cached_files())
 
 
 def _store() -> Path:

@@ -111,9 +111,12 @@ class BareMachine:
 
         cache = self.folder / "cache"
         cache.mkdir(exist_ok=True)
-        for deb in cache_folder().glob("*.deb*"):
-            if not (cache / deb.name).exists():
-                shutil.copy2(deb, cache)
+        for name in ("*.deb*", "sweethome3d-*.jar", "sweethome3d-*/*", "skies/*"):
+            for path in cache_folder().glob(name):
+                target = cache / path.relative_to(cache_folder())
+                target.parent.mkdir(exist_ok=True)
+                if not target.exists():
+                    shutil.copy2(path, target)
         return {"PBRS_CACHE": str(cache)}
 
 

@@ -2,9 +2,7 @@
 
 from __future__ import annotations
 
-import io
 import json
-import tarfile
 from pathlib import Path
 
 import numpy as np
@@ -24,6 +22,7 @@ from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.sample.camera_report import CameraReport
 from pbrs_farm.sample.camera_source import Sampling
 from pbrs_farm.store.folder import FolderStore
+from tests.assets.debs import write_deb
 from tests.example_homes import example_homes
 from tests.selection.histogram_sets import record
 
@@ -140,19 +139,6 @@ def test_homes_fetch_unpacks_the_package_and_notes_another_version(tmp_path, mon
 @pytest.mark.homes
 def test_homes_names_the_fetched_package(capsys):
     assert example_homes().label in printed(capsys, "homes")
-
-
-def write_deb(path: Path, files: dict[str, bytes]) -> None:
-    """Write a Debian package of files: an ar archive with an uncompressed data.tar."""
-    tar = io.BytesIO()
-    with tarfile.open(fileobj=tar, mode="w") as archive:
-        for name, data in files.items():
-            entry = tarfile.TarInfo(f"./{name}")
-            entry.size = len(data)
-            archive.addfile(entry, io.BytesIO(data))
-    data = tar.getvalue()
-    head = f"{'data.tar':<16}{'0':<12}{'0':<6}{'0':<6}{'100644':<8}{len(data):<10}`\n"
-    path.write_bytes(b"!<arch>\n" + head.encode() + data)
 
 
 def test_skies_unpacks_the_outdoor_panoramas_and_explains_their_use(tmp_path, monkeypatch, capsys):

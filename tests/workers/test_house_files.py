@@ -11,6 +11,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.store import MemoryStore
+from tests.assets.debs import write_deb
 from workers.house_files import (
     entries_from_arguments,
     fill_cache,
@@ -76,6 +77,25 @@ def test_a_worker_takes_the_furniture_of_a_dressed_house_from_the_store(
     assert not (debian.cache_folder() / name).exists()
     fill_cache(store, with_furniture=True)
     assert (debian.cache_folder() / name).read_bytes() == b"deb"
+
+
+def test_an_unpacked_package_travels_to_the_workers(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    monkeypatch.setenv("PBRS_CACHE", str(tmp_path / "here"))
+    (tmp_path / "here").mkdir()
+    name = f"{homes_package.PACKAGE}_{homes_package.TESTED_VERSION}_all.deb"
+    write_deb(tmp_path / "here" / name, {homes_package.JAR: b"a jar"})
+    package, store = homes_package.fetch(), MemoryStore()
+    ref = SourceRef(kind="example", location="Studio", house_id="s", sha256="0", companions="")
+    upload(store, [ref])
+    assert not any(key.endswith(".deb") for key in store.list("jobs/sources/"))
+    monkeypatch.setenv("PBRS_CACHE", str(tmp_path / "there"))
+    fill_cache(store)
+    there = homes_package.cached()
+    assert there is not None
+    assert there.label == package.label
+    assert there.jar.read_bytes() == b"a jar"
 
 
 def test_a_worker_dresses_the_variant_that_its_task_names(monkeypatch: pytest.MonkeyPatch):

@@ -116,6 +116,17 @@ def test_a_package_in_the_cache_is_used_without_a_network(tmp_path: Path) -> Non
     assert homes_package.cached(tmp_path) == package
 
 
+def test_the_cache_keeps_a_package_once(tmp_path: Path) -> None:
+    path = deb(tmp_path)
+    package = homes_package.fetch(tmp_path)
+    assert {p.name for p in tmp_path.iterdir()} == {package.jar.name, f"{path.name}.sha256"}
+    # Without its contents the package counts as absent.
+    package.jar.unlink()
+    assert homes_package.cached(tmp_path) is None
+    deb(tmp_path)
+    assert homes_package.fetch(tmp_path) == package
+
+
 def test_another_version_is_used_with_a_note(tmp_path: Path) -> None:
     deb(tmp_path, "7.5-1")
     assert "7.5-1 is not the tested version" in homes_package.fetch(tmp_path).note
