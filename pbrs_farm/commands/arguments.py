@@ -1,7 +1,4 @@
-"""Printing, and the options that several verbs share. Effects: prints.
-
-Every command imports this module, so it imports little: the recipe's models only on demand.
-"""
+"""Printing, and the options that several verbs share; imports little, as every command imports it."""
 
 from __future__ import annotations
 
@@ -45,35 +42,22 @@ VIEW: Final = "folder of a view: OUT/houses/<house>/views/<view>"
 
 
 def warn(text: str) -> None:
-    """Write a line to standard error, after the program's name.
-
-    Use it for messages that a user must see while standard output goes to a file. Control characters
-    in the text cannot forge a second line; a text of more than 1,500 characters is cut.
-    """
+    """Write a printable line, cut at 1,500 characters, to standard error, after the program's name."""
     sys.stderr.write(f"pbrs-farm: {shown(text, _MAX_LINE)}\n")
 
 
 def echo(text: str = "") -> None:
-    """Write one or more lines of a verb's result to standard output.
-
-    Control characters are shown as escapes. Messages go through `warn`.
-    """
+    """Write printable lines of a verb's result to standard output; messages go through `warn`."""
     sys.stdout.write(printable(text) + "\n")
 
 
 def echo_json(value: Any) -> None:
-    """Write a value as JSON to standard output, for --json: one document, keys sorted, indented by one.
-
-    value: any value of json.dumps. A verb that prints a line per event does not use this.
-    """
+    """Write a value to standard output as one JSON document for --json, keys sorted, indented by one."""
     echo(escaped(json.dumps(value, indent=1, sort_keys=True, ensure_ascii=False)))
 
 
 def counted(n: int, noun: str) -> str:
-    """ "1 house", "2 houses".
-
-    noun: in the singular, with a plural in -s.
-    """
+    """ "1 house", "2 houses", of a noun with a plural in -s."""
     return f"{n} {noun}" if n == 1 else f"{n} {noun}s"
 
 
@@ -87,10 +71,7 @@ def echo_notes(notes: Counter[str], out: str) -> None:
 
 
 def dress_seeds(text: str | None, option: str = "--dress") -> tuple[int, ...]:
-    """The distinct seeds of the option in the order given; empty without the option.
-
-    text: 3, 1..20 or 1,4,7. Raises BadInput for anything else, and for more than MAX_SEEDS seeds.
-    """
+    """The distinct seeds of 3, 1..20 or 1,4,7, in order; BadInput also for more than MAX_SEEDS."""
     if text is None:
         return ()
     try:
@@ -100,19 +81,13 @@ def dress_seeds(text: str | None, option: str = "--dress") -> tuple[int, ...]:
 
 
 def at_least(name: str, value: float, least: int) -> None:
-    """Raise BadInput, naming the option, if its value is below the minimum.
-
-    at_least("--jobs", args.jobs, 1)
-    """
+    """Raise BadInput, naming the option, if its value is below the minimum."""
     if value < least:
         raise BadInput(name, str(value), f"expected {least} or more")
 
 
 def add_home(p: argparse.ArgumentParser) -> None:
-    """Add the arguments for a home and for the folder of the models that its file names.
-
-    `args.home` is a word of `prepare.source.resolve`, `args.models` a folder or "".
-    """
+    """Add arguments for a home (`args.home`) and the folder of its models (`args.models`, "")."""
     from pbrs_farm.run.request import ModelsOption
 
     p.add_argument("home", help=HOME)
@@ -120,10 +95,7 @@ def add_home(p: argparse.ArgumentParser) -> None:
 
 
 def add_set(p: argparse.ArgumentParser, metavar: str, text: str) -> None:
-    """Add --set, repeatable: fields of the recipe, or of the object that metavar names.
-
-    `args.set` is a list of "path=value", which `fields_set` parses.
-    """
+    """Add --set, repeatable: a list of "path=value" of what metavar names, which `fields_set` parses."""
     group_of(p, "recipe").add_argument(
         "--set", action="append", default=[], metavar=metavar, help=text
     )
@@ -167,10 +139,7 @@ def fields_set(
 
 
 def size_of(text: str | None) -> tuple[int, int] | None:
-    """Parse WxH to (width, height) in pixels; None for None.
-
-    Raises BadInput for anything else, including a size of 0 or above 16,384.
-    """
+    """Parse WxH to (width, height) in pixels, 1 to 16,384, or None; BadInput for anything else."""
     from pbrs_farm.core.checked_calls import MAX_EDGE_PX
 
     if text is None:
@@ -227,10 +196,7 @@ def recipe_of(args: argparse.Namespace | RecipeOptions) -> Recipe:
 
 
 def store_of(url: str) -> Store:
-    """Open the store of a URL or of an existing folder, with the settings of the environment.
-
-    Raises BadInput if there is no such folder.
-    """
+    """The store of a URL or an existing folder, with the environment's settings; BadInput for neither."""
     from pbrs_farm.settings import settings_from_environment
     from pbrs_farm.store import store_from_url
 
@@ -260,10 +226,7 @@ def put_files(folder: Path, files: Mapping[str, bytes]) -> None:
 
 
 def add_farm(p: argparse.ArgumentParser) -> None:
-    """Add the options of every farm verb: --store and --json.
-
-    submit declares both in workers/job.py.
-    """
+    """Add the options of every farm verb but submit (workers/job.py): --store and --json."""
     # Not generated from a model: the small verbs import no models.
     p.add_argument(
         "--store", default="", metavar="URL", help="store of the farm (default: $PBRS_STORE)"
@@ -272,11 +235,7 @@ def add_farm(p: argparse.ArgumentParser) -> None:
 
 
 def farm_of(args: argparse.Namespace) -> Farm:
-    """The farm named by the environment and --store; connects to neither Redis nor the store.
-
-    Reads PBRS_REDIS_URL, PBRS_STORE etc. (workers/config.py). Raises BadInput if one is missing or
-    wrong.
-    """
+    """The farm of the environment (workers/config.py) and --store, unconnected; BadInput if incomplete."""
     from workers.client.farm_client import Farm
     from workers.config import config_from_environment
 

@@ -1,7 +1,4 @@
-"""The parser of the command line: commands by purpose, examples, suggestions for typing errors. Effects: prints.
-
-Options may come before or after the verb.
-"""
+"""The parser: commands by purpose, options before or after the verb, suggestions for errors. Effects: prints."""
 
 from __future__ import annotations
 
@@ -46,10 +43,7 @@ class Parser(argparse.ArgumentParser):
     """Adds a verb's options that depend on the words given, such as the form of --to; all for None."""
 
     def verbs(self) -> dict[str, Parser]:
-        """Verb -> its parser, in the order of addition.
-
-        Empty for the parser of a verb itself.
-        """
+        """Verb -> its parser, in the order of addition; empty for the parser of a verb."""
         actions = [a for a in self._actions if isinstance(a, argparse._SubParsersAction)]
         return dict(actions[0].choices) if actions else {}
 
@@ -86,10 +80,7 @@ class Parser(argparse.ArgumentParser):
 
 
 def unknown_words(words: Sequence[str], parser: argparse.ArgumentParser) -> str:
-    """Error message for words that a verb's parser does not accept.
-
-    It suggests the closest option for an unknown one; without options it names the first surplus word.
-    """
+    """Message about words that a verb does not accept: the closest option, or the first surplus word."""
     options = [word for word in words if word.startswith("-")]
     if not options:
         if "=" in words[0] and "--set" in parser._option_string_actions:
@@ -103,10 +94,7 @@ def unknown_words(words: Sequence[str], parser: argparse.ArgumentParser) -> str:
 def verb_first(
     words: Sequence[str], verbs: Sequence[str], parser_of: Callable[[str], argparse.ArgumentParser]
 ) -> list[str]:
-    """Move the verb to the front if some of its options come before it.
-
-    parser_of: a verb's parser, which knows how many words each of its options takes.
-    """
+    """Move the verb before its own options, by how many words each takes (parser_of)."""
     # A word is the verb only if all words before it are its options and their values.
     if words and words[0].startswith("-"):
         for position, word in enumerate(words):

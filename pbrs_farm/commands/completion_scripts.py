@@ -30,10 +30,7 @@ complete -o default -F _pbrs_farm pbrs-farm"""
 
 
 def completion_script(shell: str, verbs: Mapping[str, argparse.ArgumentParser]) -> str:
-    """The shell's completion script: verbs, options, their choices, example homes.
-
-    shell: one of SHELLS; zsh reads bash's script. verbs: each with its parser.
-    """
+    """The shell's completion script (one of SHELLS): verbs, options, choices, example homes."""
     if shell == "fish":
         return "\n".join(_fish_lines(verbs))
     script = _bash_script(verbs)

@@ -191,10 +191,7 @@ def _asked_for(args: argparse.Namespace) -> tuple[list[MadeHome], Programme | No
 
 
 def catalogue_here() -> Catalogue:
-    """The packages' furniture, to make homes with.
-
-    Downloads nothing: raises MachineFailed, with the command that fetches it, if it is not cached.
-    """
+    """The packages' furniture, to make homes with; MachineFailed, with the command, if not cached."""
     from pbrs_farm.prepare.dress_catalogue import catalogue_of_words, has_furniture
 
     if not has_furniture():

@@ -41,10 +41,7 @@ def job_file(words: list[str]) -> dict[str, Any] | None:
 
 
 def job_like(file: str, homes: list[str]) -> dict[str, Any]:
-    """The job of a template with these homes, which replace those of the file, if any.
-
-    Raises BadInput as job_file does.
-    """
+    """The job of a template; homes, if any, replace those of its file. BadInput as job_file."""
     return _checked({**_tables(file), "homes": homes}, file)
 
 
@@ -69,10 +66,7 @@ def _checked(job: dict[str, Any], file: str) -> dict[str, Any]:
 def submit_arguments(
     job: Mapping[str, Any], args: argparse.Namespace, parser: argparse.ArgumentParser, file: str
 ) -> argparse.Namespace:
-    """The arguments of submit for a job; options on the command line override its file.
-
-    Raises BadInput, naming file and entry, for an unknown option of submit or a value that does not fit.
-    """
+    """The arguments of submit for a job, overridden by the command line; BadInput names the entry."""
     from workers.job import SubmitRequest
 
     table = {**job.get("render", {}), **job.get("select", {})}

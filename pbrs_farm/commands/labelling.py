@@ -78,10 +78,7 @@ def add_verbs(verb: Verb) -> None:
 
 
 def _add_form_options(p: argparse.ArgumentParser, words: Sequence[str] | None) -> None:
-    """Add the options of the form that the words name; of all forms if words is None.
-
-    An option that only other forms have ends the command with an error that names them.
-    """
+    """Add the options of the named form, or of all; an option of other forms alone is an error."""
     from pbrs_farm.export.form import all_forms, form_options, no_such_option
 
     if words is None:

@@ -1,7 +1,4 @@
-"""Verbs that describe the program and the machine: doctor, help, cache, inputs, skies, recipes, layers, completion.
-
-Effects: print; skies downloads, cache deletes.
-"""
+"""Verbs that describe the program and the machine; effects: print; skies downloads, cache deletes."""
 
 from __future__ import annotations
 
@@ -107,10 +104,7 @@ def _help(args: argparse.Namespace) -> int:
 
 
 def _pages() -> dict[str, str]:
-    """Name of a page of the manual, such as howto/walk -> its Markdown without the marks for tests.
-
-    Pages of api/ are left out: the site fills them from docstrings.
-    """
+    """Name of a page of the manual, such as howto/walk -> its Markdown; without api/, made of docstrings."""
     package = Path(__file__).parents[1]
     folder = package / "pages" if (package / "pages").is_dir() else package.parent / "docs"
     paths = [p for p in sorted(folder.rglob("*.md")) if p.parent.name != "api"]

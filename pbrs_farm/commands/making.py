@@ -132,10 +132,7 @@ def run_homes(
 def run_and_report(
     run: Run, n_homes: int, *, as_json: bool, observe: Observer | None = None
 ) -> Summary:
-    """Run it, print its progress in the form that suits standard output, then its results.
-
-    n_homes: to estimate the time left. observe: also receives each event. Raises as run_local.
-    """
+    """Run it, print progress and results for standard output's kind; observe: receives each event."""
     from pbrs_farm.progress import progress_reporter
     from pbrs_farm.run.local import run_local
 

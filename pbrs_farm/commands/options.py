@@ -35,10 +35,7 @@ def add_options(
 
 
 def group_of(p: argparse.ArgumentParser, title: str) -> argparse._ArgumentGroup:
-    """The parser's help group of that title, created if missing.
-
-    So options of one subject stay together, whichever function adds them.
-    """
+    """The parser's help group of that title, created if missing, so that a subject stays together."""
     for group in p._action_groups:
         if group.title == title:
             return group

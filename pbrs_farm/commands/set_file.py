@@ -304,10 +304,7 @@ def _parts_of(table: FormTable, parts: tuple[str, ...]) -> tuple[str, ...]:
 
 
 def options_given(part: SetPart) -> dict[str, Any]:
-    """A part's options for `submit`, by name; options of viewpoints become fields of the recipe.
-
-    Raises BadInput for a user's trajectory file, which workers cannot read.
-    """
+    """A part's options for `submit`, viewpoints as recipe fields; BadInput for a user's trajectory file."""
     values = dict(part.values)
     values.pop("select", None)
     if "trajectory" in values:

@@ -1,8 +1,4 @@
-"""The farm's verbs for monitoring and control, and its two services. Effects: Redis, the store, stdout.
-
-Imports little: `status` runs often, on busy machines. None of these verbs imports numpy, celery or
-mitsuba (coordinator and worker do, when they start).
-"""
+"""The farm's verbs and services, importing little, as `status` runs often. Effects: Redis, store, stdout."""
 
 from __future__ import annotations
 

@@ -104,10 +104,7 @@ def _write_films(folder: Path) -> None:
 
 
 def write_sheets(folder: Path, max_views: int, parts: SheetParts | None = None) -> None:
-    """Write sheet.png and index.html into an output folder and print their paths.
-
-    parts: tiles and cards made during rendering.
-    """
+    """Write sheet.png and index.html (parts: made during rendering) and print their paths."""
     from pbrs_farm.gallery.contact_sheet import contact_sheet
     from pbrs_farm.gallery.gallery_page import gallery_pages
 

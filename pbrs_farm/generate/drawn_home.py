@@ -51,11 +51,7 @@ def drawn_home(
     programme: Programme | None = None,
     style: str = "",
 ) -> DrawnHome:
-    """A home by seed, or for a programme. Raises BadInput if no plan fits, or for a style.
-
-    A plan whose rooms cannot hold what they must is drawn anew; after a number of tries the home
-    that breaks fewest gates is given, which says which.
-    """
+    """A home by seed or for a programme; of some tries the one that breaks fewest gates. BadInput without."""
     # Draw the family once, so that families whose plans often fail are not under-represented.
     wishes = with_family(wishes or Wishes(), rng) if programme is None else wishes
     best: DrawnHome | None = None
@@ -79,10 +75,7 @@ def drawn_home(
 def with_other_uses(
     plans: tuple[Plan, ...], wishes: Wishes, rng: np.random.Generator
 ) -> tuple[Plan, ...]:
-    """The storeys with the wished offices, else with a dining room and an office by chance.
-
-    Chance leaves the wished number of bedrooms, and one at least.
-    """
+    """The storeys with the wished offices, else by chance a dining room and an office; bedrooms remain."""
     if wishes.offices is not None:
         return with_rooms_of(plans, RoomType.OFFICE, wishes.offices)
     family = plan_families()[plans[0].family]

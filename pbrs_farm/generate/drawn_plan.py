@@ -21,11 +21,7 @@ _PROGRAMMES: Final = 6  # programmes drawn and tried before the wish is refused
 def drawn_plan(
     rng: np.random.Generator, wishes: Wishes | None = None, programme: Programme | None = None
 ) -> Plan:
-    """Generate a floor plan by seed, for a given programme or for one drawn within wishes.
-
-    wishes: bedrooms, area, family; programme: the rooms by name as a user wrote them, all of them
-    required. Raises BadInput if no plan fits; a drawn programme is redrawn several times first.
-    """
+    """A floor plan by seed, for a user's programme or drawn within wishes; BadInput if none fits."""
     if programme:
         plans = (wishes and wishes.plans) or programme.plans
         where = layout(replace(programme, plans=plans), rng, is_fixed=True)
@@ -41,10 +37,7 @@ def drawn_height(where: Layout, rng: np.random.Generator) -> float:
 
 
 def plan_of_layout(where: Layout, height: float, rng: np.random.Generator) -> Plan:
-    """Walls and rooms on the rectangles of a layout, with doors and windows drawn by seed.
-
-    height: from floor to ceiling, metres. A balcony is a room and walls more than the layout has.
-    """
+    """Rooms, walls, doors and windows by seed on a layout's rectangles; a balcony comes on top."""
     runs = runs_of(where)
     walls = walls_of(where, runs)
     rooms = rooms_of(where, walls)

@@ -1,8 +1,4 @@
-"""Values of a floor plan and its furniture: rooms, walls, openings, pieces, storeys; no effects.
-
-Frozen values in metres. Coordinates are (x, z) as in a house: x to the right, z downwards on the page, as Sweet Home 3D
-draws its plans.
-"""
+"""Frozen values of a floor plan and its furniture, metres, (x, z) with z down the page; no effects."""
 
 from __future__ import annotations
 
@@ -93,10 +89,7 @@ class PlanRoom:
         return min(xs), min(zs), max(xs), max(zs)
 
     def contains(self, point: Point) -> bool:
-        """True if a point (x, z), metres, is inside the room's polygon.
-
-        A ray to the right crosses an odd number of sides. Points on a side may be either.
-        """
+        """True if a point (x, z), metres, is inside the room's polygon, by the sides a ray crosses."""
         x, z = point
         crossed = [
             (za > z) != (zb > z) and x < xa + (z - za) / (zb - za) * (xb - xa)
@@ -137,10 +130,7 @@ class PlanWall:
     def corners(
         self, *, to_start: bool = True, to_end: bool = True
     ) -> tuple[Point, Point, Point, Point]:
-        """Corners of the wall's ground; an end at another wall is extended by half its thickness.
-
-        (x, z) metres. to_start, to_end: False if that end is free and not extended.
-        """
+        """Corners (x, z) of the wall's ground, extended by half its thickness at ends that meet another wall."""
         (nx, nz), half = self.normal, self.thickness / 2
         a, b = self.at(-half * to_start), self.at(self.length + half * to_end)
         nx, nz = nx * half, nz * half
@@ -158,10 +148,7 @@ class PlanWall:
         return float(min(*ends, *heights[(places > low) & (places < high)]))
 
     def at(self, along: float) -> Point:
-        """The point of the middle line `along` metres from its start.
-
-        Beyond its ends the line goes on. ZeroDivisionError for a wall without length.
-        """
+        """The point of the middle line, or its extension, `along` metres from its start."""
         t = along / self.length
         (x0, z0), (x1, z1) = self.start, self.end
         return x0 + t * (x1 - x0), z0 + t * (z1 - z0)
@@ -249,20 +236,12 @@ def ground(piece: PlacedPiece) -> Rect:
 
 
 def turned_upright(plan: Plan) -> Plan:
-    """The plan turned about its origin by less than 45 degrees, the longest way of its walls upright.
-
-    Corners are rounded to millimetres. Openings are given along their walls, so they turn with
-    these.
-    """
+    """The plan turned about its origin by less than 45 degrees, its longest walls upright, to millimetres."""
     return turned_by(plan, upright_angle(plan.rooms))
 
 
 def upright_angle(rooms: Sequence[PlanRoom]) -> float:
-    """Radians by which rooms are turned about the origin so that most of their walls are upright.
-
-    At most 45 degrees either way. Sides count by their length, in bins of a tenth of a degree;
-    ValueError without any room.
-    """
+    """Radians, at most 45 degrees, by which to turn rooms so that most of their walls are upright."""
     ways: dict[float, float] = {}
     for (x0, z0), (x1, z1) in (edge for room in rooms for edge in room.edges):
         angle = math.degrees(math.atan2(z1 - z0, x1 - x0)) % 90
@@ -273,10 +252,7 @@ def upright_angle(rooms: Sequence[PlanRoom]) -> float:
 
 
 def turned_by(plan: Plan, angle_rad: float) -> Plan:
-    """The plan turned about its origin.
-
-    angle_rad: from x towards z. Corners are rounded to millimetres, so turning back is not exact.
-    """
+    """The plan turned about its origin by an angle from x towards z, corners rounded to millimetres."""
     if angle_rad == 0:
         return plan
     cos, sin = math.cos(angle_rad), math.sin(angle_rad)

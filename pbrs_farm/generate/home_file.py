@@ -86,11 +86,7 @@ class Paints:
 
 
 def drawn_paints(rng: np.random.Generator, family: PlanFamily) -> Paints:
-    """Three paints of a family for walls, doors and windows of one paint.
-
-    Colours are RRGGBB, sRGB. rng: its state moves on, so the order of drawing is part of what a
-    seed means.
-    """
+    """RRGGBB paints of a family for walls, doors and windows of one paint, drawn by rng."""
     chosen = [family.walls[i] for i in rng.permutation(len(family.walls))[:3]]
     wood = family.opening_paints[int(rng.integers(len(family.opening_paints)))]
     red, green, blue = (int(wood[k : k + 2], 16) / 255 for k in (0, 2, 4))
@@ -120,11 +116,7 @@ def home_contents(
     name: str = "home",
     origin: str = "",
 ) -> HomeContents:
-    """Contents of a .sh3d with these storeys; deterministic. origin: identity of the generated home.
-
-    storeys: from below; stair: between the first two. Pieces whose model the catalogue cannot load
-    are left out.
-    """
+    """Contents of a .sh3d with these storeys, from below; pieces without a model are left out."""
     plan, placed = storeys[0].plan, [p for s in storeys for p in s.pieces]
     contents = HomeContents()
     home = contents.home

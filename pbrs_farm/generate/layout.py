@@ -108,10 +108,7 @@ def easier_programmes(programme: Programme) -> list[tuple[str, Programme]]:
 def storey_layout(
     programme: Programme, core: Core, n_tries: int, rng: np.random.Generator
 ) -> Layout | None:
-    """Rectangles for one storey of several around their core; None where annealing finds none.
-
-    A storey has few leaves, and many cores have no plan: each is annealed for a short while.
-    """
+    """Rectangles for a storey around a core, or None; many cores have no plan, so annealing is short."""
     return _solved_layout(programme, rng, is_fixed=True, core=core, n_tries=n_tries)
 
 

@@ -94,10 +94,7 @@ def obj_file(shape: Shape) -> bytes:
 
 
 def side_files(shape: Shape) -> dict[str, bytes]:
-    """model.mtl and the textures of a shape, by file name; they lie beside model.obj.
-
-    The textures are as the shape has them, not encoded anew.
-    """
+    """model.mtl and the textures of a shape, as it has them, by file name."""
     pictures = {
         texture_id: f"texture{k}.{_ENDINGS.get(texture.media_type, 'png')}"
         for k, (texture_id, texture) in enumerate(sorted(shape.textures.items()))
@@ -146,10 +143,7 @@ def _obj_lines(shape: Shape) -> Iterator[str]:
 
 
 def _visible_surface(surface: Surface) -> Surface:
-    """The surface without faces that have no area once written, and without vertices of those alone.
-
-    The program, and every reader, fits the box of all vertices to the piece's size.
-    """
+    """The surface without faces that have no area once written, and without their vertices."""
     written = np.asarray(surface.positions, np.float64).round(_DECIMALS)
     visible = surface.faces[face_areas(written[surface.faces]) > 0]
     used, faces = np.unique(visible, return_inverse=True)

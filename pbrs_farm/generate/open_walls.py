@@ -96,10 +96,7 @@ class WallDrawing:
         return sorted([*gaps, (low, high)], key=lambda g: (g[0] - g[1], g[0]))
 
     def swing(self, run: WallRun, at: float, width: float, room: int) -> Rect:
-        """The square of a room that the leaf of a door sweeps: x0, z0, x1, z1, metres.
-
-        at: middle of the door along the run; width: of its leaf; room: the number of the one it opens into.
-        """
+        """The square x0, z0, x1, z1 of a room (number) that a door's leaf sweeps, its middle `at` along the run."""
         side = 1 if run.after == room else -1
         line = run.line * STEP_M
         across, along = sorted((line, line + side * width)), (at - width / 2, at + width / 2)

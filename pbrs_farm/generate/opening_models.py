@@ -92,11 +92,7 @@ def drawn_design(
 
 
 def opening_model(opening: PlanOpening, wall_m: float, design: OpeningDesign) -> Shape:
-    """The door or window of an opening as a shape: frame, leaf or sashes, handles, panes.
-
-    wall_m: the wall's thickness; the frame is 2 cm deeper, so that it shows on both sides. design: the
-    paint, leaves and sashes of the whole home.
-    """
+    """The door or window of an opening; its frame is 2 cm deeper than the wall, to show on both sides."""
     paint = Material("joinery", diffuse=design.colour, specular=(0.3, 0.3, 0.3), shininess=40.0)
     metal = Material("handle", diffuse=(0.2, 0.2, 0.2), specular=(0.7, 0.7, 0.7), shininess=60.0)
     glass = Material("pane", kind=MaterialKind.PANE, diffuse=(0.9, 0.95, 0.95), opacity=0.2)
@@ -253,10 +249,7 @@ def _handles(w: float, d: float, hinge_at_start: bool, kind: str) -> list[_Box]:
 def _sashes(
     w: float, h: float, design: OpeningDesign, *, is_french: bool
 ) -> Iterator[tuple[tuple[float, float], list[_Box], list[_Box], list[_Box]]]:
-    """(span of x, bars, panes, catches) of sashes side by side, each narrower than a metre.
-
-    A light above a sash has no joint: it turns with the sash below it.
-    """
+    """(span of x, bars, panes, catches) of sashes narrower than a metre; a light above one turns with it."""
     n = max(1, round((w - 2 * _FRAME_M) / _WIDEST_SASH_M + 0.3))
     inner, low, high = w - 2 * _FRAME_M, _FRAME_M * 0.7, h - _FRAME_M
     # Where an upper light begins, and what each of the two shows.

@@ -32,11 +32,7 @@ _OPENS_OUT: Final = (RoomType.WC, RoomType.STORE)
 
 
 def plan_faults(plan: Plan) -> list[str]:
-    """Faults of a plan, one line each; empty for a good plan.
-
-    Reports rooms without the daylight they need, and unreachable rooms. Furniture and widths of doors
-    are not considered.
-    """
+    """Rooms without the daylight they need, and unreachable rooms, one line each."""
     return [*_dark_rooms(plan), *_unreached_rooms(plan)]
 
 
@@ -201,10 +197,7 @@ def _add_door(
     *,
     may_meet: bool = True,
 ) -> bool:
-    """Add a door at one end of a run, hinged towards the corner; False if there is no space.
-
-    may_meet: its swing may overlap that of another door.
-    """
+    """Add a door at one end of a run (its swing may meet another's if may_meet); False without space."""
     low, high = drawing.free(run)
     # Stand nearer to the corner where the wall is short.
     corner = min(_FROM_CORNER_M, (high - low - width) / 2)

@@ -50,11 +50,7 @@ class WallRun:
 
 
 def runs_of(layout: Layout) -> list[WallRun]:
-    """Every stretch between two different neighbours, outside included; in a fixed order.
-
-    The order is fixed, so draws by seed over it repeat. A run is as long as both its neighbours
-    stay the same.
-    """
+    """Every stretch between the same two neighbours, outside included, in a fixed order for the draws."""
     # Paint the owners on the grid, with a rim of outside.
     owner = np.full((layout.depth + 2, layout.width + 2), OUTSIDE, np.int32)
     for number, parts in enumerate(layout.parts):
@@ -88,10 +84,7 @@ def thickness(run: WallRun, types: list[RoomType]) -> float:
 
 
 def walls_of(layout: Layout, runs: list[WallRun]) -> tuple[PlanWall, ...]:
-    """Merge collinear runs of equal thickness into walls; open sides get none.
-
-    runs: from `runs_of`. Collinear stretches of unequal thickness stay separate walls.
-    """
+    """Merge collinear runs of equal thickness into walls; open sides get none."""
     types = [wish.type for wish in layout.programme.rooms]
     is_open = open_pairs(layout)
     standing = [(r, thickness(r, types)) for r in runs if r.rooms not in is_open]
@@ -126,11 +119,7 @@ def open_pairs(layout: Layout) -> frozenset[frozenset[int]]:
 
 
 def rooms_of(layout: Layout, walls: tuple[PlanWall, ...]) -> tuple[PlanRoom, ...]:
-    """The rooms: their rectangles minus the walls' ground.
-
-    (x, z) metres; a room is the free area between the faces of its walls, its largest part if a wall
-    divides it.
-    """
+    """The rooms: their rectangles minus the walls' ground, the largest part of each."""
     ground = unary_union([Polygon(wall.corners()) for wall in walls])
     count: dict[RoomType, int] = {}
     types = [wish.type for wish in layout.programme.rooms]
@@ -150,10 +139,7 @@ def rooms_of(layout: Layout, walls: tuple[PlanWall, ...]) -> tuple[PlanRoom, ...
 
 
 def corners(shape: BaseGeometry) -> tuple[Point, ...]:
-    """The corners of a shape's largest part, anticlockwise, without those on a straight side.
-
-    Rounded to a tenth of a millimetre; holes are dropped. () for a shape without an area.
-    """
+    """Corners of a shape's largest part, anticlockwise, to a tenth of a millimetre, without holes; or ()."""
     if isinstance(shape, MultiPolygon):
         shape = max(shape.geoms, key=lambda part: part.area)
     simple = shape.simplify(1e-6)
@@ -179,11 +165,7 @@ def _turn(a: Point, b: Point, c: Point) -> float:
 
 
 def largest_rectangle(polygon: Polygon) -> Rect:
-    """The largest axis-aligned rectangle inside a rectilinear polygon; its bounds if there is none.
-
-    Tries all pairs of corner coordinates: suitable for rooms, not for outlines with hundreds of
-    corners.
-    """
+    """The largest axis-aligned rectangle inside a rectilinear polygon of few corners, else its bounds."""
     points = list(polygon.exterior.coords)
     xs, zs = sorted({p[0] for p in points}), sorted({p[1] for p in points})
     x0, z0, x1, z1 = polygon.bounds
@@ -198,11 +180,7 @@ def largest_rectangle(polygon: Polygon) -> Rect:
 
 
 def balcony(run: WallRun, low: float, high: float) -> tuple[PlanRoom, tuple[PlanWall, ...]]:
-    """A balcony before the outer run, between two coordinates of its axis in metres.
-
-    low, high: metres on the run's axis, parapet included. The room and its parapet's walls; the
-    door to it is an opening of the run's wall, drawn elsewhere.
-    """
+    """A balcony's room and parapet before the outer run, between low and high on its axis, metres."""
     outwards = -1.0 if run.before == OUTSIDE else 1.0
     face = run.line * STEP_M + outwards * OUTER_M / 2
     rim = face + outwards * BALCONY_DEPTH_M

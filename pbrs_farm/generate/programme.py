@@ -1,7 +1,4 @@
-"""Programmes: which rooms a home has and how large; drawn by seed or given by a user; no effects.
-
-Medians and shares are those of nine homes drawn by people (65 rooms), docs/homes.md.
-"""
+"""Rooms and sizes of a home, by seed (medians of nine homes, docs/homes.md) or a user; no effects."""
 
 from __future__ import annotations
 
@@ -95,10 +92,7 @@ class Programme:
 
     @property
     def en_suites(self) -> dict[int, tuple[int, ...]]:
-        """Bathroom -> the bedrooms with a door to it, from the wishes for adjacency.
-
-        If several bathrooms qualify, the last is en suite: the first serves the whole home.
-        """
+        """Bathroom -> the bedrooms with a door to it, by the wishes; the first of several serves all."""
         types = [wish.type for wish in self.rooms]
         suites: dict[int, tuple[int, ...]] = {}
         for room, partners in self.adjacent:
@@ -127,11 +121,7 @@ class Wishes:
 
 
 def drawn_programme(rng: np.random.Generator, wishes: Wishes | None = None) -> Programme:
-    """A programme by seed: studio to four bedrooms, closed or open kitchen, WC, store, wardrobe.
-
-    wishes: None for any. 64 programmes are drawn; where none has the wished area, the last one's
-    rooms are scaled to it, which keeps their shares.
-    """
+    """A programme by seed, a studio to four bedrooms; of 64, the first (or last, scaled) of the wished area."""
     wishes = with_family(wishes or Wishes(), rng)
     # Draw until the area is as wished; then scale the rooms to it.
     for _ in range(64):

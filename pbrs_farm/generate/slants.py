@@ -56,10 +56,7 @@ def _with_slanted_side(plan: Plan, rng: np.random.Generator) -> Plan:
 
 
 def _slanted(plan: Plan, axis: int, outwards: int, slope: float, *, grows: bool) -> Plan | None:
-    """The plan with the side at the least or greatest x (axis 0) or z (1) slanted; None if a balcony is there.
-
-    grows: whether the offset increases with the coordinate.
-    """
+    """The plan with the side at an end of axis 0 (x) or 1 (z) slanted; None if a balcony is there."""
     walls = [w for w in plan.walls if w.is_outer and w.height is None]
     across = [p[axis] for w in walls for p in (w.start, w.end)]
     line = max(across) if outwards > 0 else min(across)
@@ -155,11 +152,7 @@ def _is_level(wall: PlanWall) -> bool:
 
 
 def _bay(plan: Plan, number: int, depth: float, spread: float) -> Plan | None:
-    """The plan with a bay of three walls before an opening; None where something is in the way.
-
-    depth: from the wall's middle line to that of the bay's front. spread: by which its mouth is wider
-    than its front, on either side.
-    """
+    """The plan with a bay before an opening, its mouth wider than its front by spread; None without room."""
     opening = plan.openings[number]
     wall, room = plan.walls[opening.wall], plan.rooms[opening.room]
     half = opening.width / 2 + _BESIDE_PANE_M + wall.thickness / 2

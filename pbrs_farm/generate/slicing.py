@@ -75,11 +75,7 @@ def solved(
     n_moves: int = N_MOVES,
     ratios: tuple[float, float] = (0.6, 1.7),
 ) -> tuple[Brief, list[IntRect]] | None:
-    """An outline and a rectangle for each leaf that meet every hard rule; None if annealing fails.
-
-    outline: its width and depth in steps; another one of the leaves' area and of these ratios each
-    time if not given.
-    """
+    """An outline (given, or drawn by ratios) and a rectangle for each leaf that meet all hard rules; or None."""
     w, d = outline or drawn_outline(sum(leaf.area for leaf in leaves), rng, ratios)
     brief = Brief(leaves, contacts, hall, w, d, lit_sides, given_places(leaves))
     rects, unmet = _annealed(brief, _Random(rng), n_moves)

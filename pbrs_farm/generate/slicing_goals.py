@@ -75,11 +75,7 @@ class Rules:
         ]
 
     def judge(self, rects: list[IntRect]) -> tuple[float, int]:
-        """Score one rectangle per leaf against the brief: (cost, number of violated hard rules).
-
-        rects: in steps of STEP_M on the walls' centre lines, in the order of the brief's leaves. The cost
-        is smooth to guide the annealing: a nearly satisfied rule costs less.
-        """
+        """(smooth cost, number of violated hard rules) of a rectangle, in steps of STEP_M, for each leaf."""
         total, unmet = 0.0, 0
         for leaf, (min_width, max_aspect, has_place), rect in zip(
             self._brief.leaves, self._limits, rects, strict=True
@@ -116,10 +112,7 @@ class Rules:
         return total, unmet
 
     def _missing_place(self, leaf: SliceLeaf, rect: IntRect, rects: list[IntRect]) -> float:
-        """Metres by which a leaf misses where it must lie, and of outer wall that it lacks.
-
-        Of a notch, whether it is off the corners.
-        """
+        """Metres by which a leaf misses its place and outer wall; of a notch, whether it is off the corners."""
         if leaf.is_corner:
             return self._off_corner(rect)
         if leaf.is_court:

@@ -1,8 +1,4 @@
-"""A half-turn staircase: two parallel flights and a landing; no effects.
-
-The shape is in metres on the lower floor, with its base centred at the origin and its front towards
-+z, where both flights begin and end. The front edge reaches the upper floor.
-"""
+"""A half-turn staircase, base centred, both flights starting at its front +z, metres; no effects."""
 
 from __future__ import annotations
 
@@ -59,11 +55,7 @@ class Stair:
 def stair_between(
     lower: Plan, upper: Plan, front: Point, slab_m: float, *, foot_is_right: bool
 ) -> Stair:
-    """The staircase in the stairwell of two plans that lie above each other.
-
-    slab_m: thickness of the floor between, metres. front, foot_is_right: as in Stair. Both plans must
-    have a room of the type STAIRS.
-    """
+    """The staircase in the STAIRS of two plans above each other, with slab_m metres between."""
     wells = [next(r for r in p.rooms if r.type is RoomType.STAIRS) for p in (lower, upper)]
     free = Polygon(wells[0].polygon).intersection(Polygon(wells[1].polygon))
     assert isinstance(free, Polygon)

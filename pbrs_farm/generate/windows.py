@@ -112,10 +112,7 @@ def _add_row(
     room: int,
     wish: tuple[int, float, float, float],
 ) -> float:
-    """Windows of one size spread over a gap of a run; gives their glass in square metres.
-
-    wish: how many, their glass, height and sill.
-    """
+    """Spread the wished windows over a gap of a run; their glass in square metres."""
     (low, high), (n, missing, height, sill) = gap, wish
     for count in range(n, 0, -1):
         room_each = (high - low - _CLEAR_M * (count + 1)) / count

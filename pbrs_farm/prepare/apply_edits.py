@@ -58,10 +58,7 @@ from pbrs_farm.regular_files import MAX_DIGEST_BYTES, fault_of, read_regular
 
 
 def apply_edits(house: House, source: SourceRef, fields: ReadFields) -> House:
-    """Apply the source's edits to the house of its `unedited`; the result has the source's id.
-
-    Raises BadInput for an item that the house does not have, and for a missing or changed file.
-    """
+    """Apply the source's edits to the house of its `unedited`; BadInput for a missing item or file."""
     for edit in source.edits:
         house = _ONE[edit.do](house, edit, fields)
     if len(house.items) > MAX_INSTANCES:

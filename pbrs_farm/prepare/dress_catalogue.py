@@ -1,8 +1,4 @@
-"""The catalogue for dressing, read once per process.
-
-Effects: reads the cached packages and the user's libraries, and writes the shapes it has read to the
-cache; downloads nothing unless asked.
-"""
+"""The catalogue for dressing, read once per process from cached packages and users' libraries; caches shapes."""
 
 from __future__ import annotations
 
@@ -26,10 +22,7 @@ GENERATED = "generated"
 
 
 def fetch_packages(words: str) -> None:
-    """Download the packages of catalogue_of_words that are not cached; MachineFailed if apt cannot.
-
-    Reads the user's libraries: BadInput if a path does not exist or is not a catalogue.
-    """
+    """Download the missing packages of catalogue_of_words; MachineFailed, BadInput for a bad path."""
     paths = [word for word in words.split(":") if word]
     if GENERATED not in paths:
         furniture_package.fetch()
@@ -39,10 +32,7 @@ def fetch_packages(words: str) -> None:
 
 
 def catalogue_of_words(words: str) -> Catalogue:
-    """The catalogue for dress.catalogue: the packages, then the given paths, separated by ":".
-
-    A missing package adds a note of the kind NO_FURNITURE. Raises BadInput if a path is not a catalogue.
-    """
+    """The packages (a missing one is a note), then paths separated by ":"; BadInput for a bad path."""
     paths = [word for word in words.split(":") if word]
     stamps = tuple((Path(word), _stamp(Path(word))) for word in paths if word != GENERATED)
     if GENERATED in paths:
@@ -51,10 +41,7 @@ def catalogue_of_words(words: str) -> Catalogue:
 
 
 def own_catalogue(paths: Sequence[Path]) -> Catalogue:
-    """Index the user's libraries and folders alone, once; the result may hold nothing but notes.
-
-    Raises BadInput if a path is not a library.
-    """
+    """Index the user's libraries and folders alone, once; may hold only notes. BadInput for no library."""
     from pbrs_farm.read.catalogue.read_catalogue import catalogue_from
 
     return catalogue_from((), given=paths, store=_store(), may_be_empty=True)
@@ -111,9 +98,5 @@ def catalogue_of(fields: DressFields) -> Catalogue:
 
 
 def fetch_catalogue(fields: DressFields) -> None:
-    """Download the missing packages of a recipe's catalogue.
-
-    Raises MachineFailed, with the command to type, if apt cannot provide them, and BadInput if a user's
-    path is not a library.
-    """
+    """Download the missing packages of a recipe; MachineFailed with the command, BadInput for a bad path."""
     fetch_packages(fields.catalogue)

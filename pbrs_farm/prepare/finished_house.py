@@ -1,7 +1,4 @@
-"""Finish the house of a source: the passes of prepare/passes.py, in their order.
-
-Effects: those of the passes. Nothing is written.
-"""
+"""Finish the house of a source by the passes of prepare/passes.py, in their order; nothing is written."""
 
 from __future__ import annotations
 
@@ -20,20 +17,14 @@ if TYPE_CHECKING:
 
 
 class HouseBeforeEdits:
-    """Cache of the last finished house before its edits: homes that differ only in edits are prepared once.
-
-    A process has one beside its HouseCache, and passes it to finished_house.
-    """
+    """The process's last finished house before its edits, which many edited homes share."""
 
     def __init__(self) -> None:
         self._key = ""
         self._finished: FinishedHouse | None = None
 
     def get(self, source: SourceRef, recipe: Recipe) -> FinishedHouse | None:
-        """The cached house of a source without edits (`SourceRef.unedited`); None for any other source.
-
-        Only the last house is cached.
-        """
+        """The cached house of a source without edits (`SourceRef.unedited`); None for others."""
         return self._finished if self._key == cache_key(source, recipe) else None
 
     def keep(self, source: SourceRef, recipe: Recipe, finished: FinishedHouse) -> None:

@@ -38,10 +38,7 @@ _NAMES: Final = re.compile(rb'"([A-Za-z_]{3,40})"\s*:')
 
 
 def formats() -> Iterator[Format]:
-    """All supported formats in the order in which they are tried: packages of read/, then plans.
-
-    A generator, because importing a format takes time and the first ones serve most words.
-    """
+    """All supported formats, each imported when it is tried: packages of read/, then plans."""
     yield from formats_of_packages()
     yield from _formats_of_plans()
 
@@ -84,10 +81,7 @@ def plugin_of_file(path: Path) -> str | None:
 
 
 def format_of_file(path: Path, *, surely: bool = False) -> Format | None:
-    """The format of a file or of the folder of a home; None without one.
-
-    surely: a suffix that files of other kinds share is not enough. Raises BadHouse for an unreadable file.
-    """
+    """The format of a file or a home's folder, or None; surely: not by a suffix that other files share."""
     look = _Look(path)
     match = next((entry for entry in formats() if look.is_of(entry)), None)
     if match is None and not surely and path.is_file():

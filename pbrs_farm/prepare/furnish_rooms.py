@@ -115,10 +115,7 @@ class _Storey:
 def furnish_rooms(
     house: House, catalogue: Catalogue, seed: int, style: str = "", which: Furnish = "empty"
 ) -> House:
-    """Furnish the empty rooms of a house; the same seed gives the same furniture.
-
-    which: `sparse` includes rooms with little furniture, which they keep. Raises BadInput for an unknown style.
-    """
+    """Furnish the empty (and `sparse`) rooms of a house by seed; BadInput for an unknown style."""
     with closing(MutableHouse(house, seed)) as mutable:
         return _furnished(mutable, catalogue, style, _MOST_COVERED[which])
 

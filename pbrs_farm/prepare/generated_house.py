@@ -1,8 +1,4 @@
-"""Convert a generated home to a House without an intermediate file. No effects.
-
-The House is bit by bit the one that the home's .sh3d gives, in a fraction of the time: nothing is
-written as text, packed, unpacked and parsed.
-"""
+"""A generated home as the House that its .sh3d gives, bit by bit, but without packing it; no effects."""
 
 from __future__ import annotations
 
@@ -19,10 +15,7 @@ from pbrs_farm.read.sweethome3d.home_file.container import Container
 
 
 def house_of_contents(contents: HomeContents, name: str, sha256: str, fields: ReadFields) -> House:
-    """The house that read_home makes of contents.archive(). Raises BadHouse as it does.
-
-    name: of the virtual file. sha256: digest of the home's inputs, since there is no file.
-    """
+    """The house, or BadHouse, that read_home makes of contents.archive(); sha256: of the home's inputs."""
     parsed = {
         path: model
         for path, shape in contents.shapes.items()

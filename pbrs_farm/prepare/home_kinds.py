@@ -158,11 +158,7 @@ def _plugin_source(word: str, _files: SourceFiles) -> SourceRef:
 
 
 def _finish_plugin(source: SourceRef, recipe: Recipe, finish: Finish) -> FinishedHouse:
-    """The finished house of the Home that a plugin gives for a seed, under the source's own id.
-
-    The Home may set its own recipe fields for reading, dressing and repair; BadInput for fields
-    that belong to the run, and for a source with a seed of dressing.
-    """
+    """The finished Home of a plugin's seed, under the source's id; BadInput for fields of the run in it."""
     if source.dress_seed:
         raise BadInput(source.location, "--dress", "plugins dress their homes themselves")
     home = _plugin_home(source.location).make()

@@ -23,11 +23,7 @@ _NEAR: Final = 1e-3  # tolerance of a stopped joint, radians or metres
 
 
 def opened(house: House, index: int, part: str, share: float) -> House:
-    """Open a part of items[index] by a share of its joint's range, 0..1.
-
-    A wall or item in the way stops it earlier, with a note. A joint already open beyond that share is
-    closed to it.
-    """
+    """Open a part of items[index] by a share 0..1 of its range, or, with a note, up to an obstacle."""
     value, notes = _reach(house, index, part, share)
     item = item_at(house.items[index], part, value)
     items = tuple(item if k == index else unchanged for k, unchanged in enumerate(house.items))
@@ -83,10 +79,7 @@ def _value(joint: Joint, share: float) -> float:
 
 
 def left_open(house: House, share: float, seed: int) -> House:
-    """Leave a random share of the doors and drawers open, each by a random amount.
-
-    Windows and doors to the outside remain closed.
-    """
+    """Leave a random share of the doors and drawers, but windows and outer doors, open by random amounts."""
     for index, item in enumerate(house.items):
         if item.is_outside or item.is_removed:
             continue

@@ -100,10 +100,7 @@ class Pass:
 
 
 def dress_seed(source: SourceRef, recipe: Recipe) -> int:
-    """Seed of dressing: that of the source's word, else the recipe's; 0 = not dressed.
-
-    An object without context is never dressed.
-    """
+    """Seed of dressing: that of the source's word, else the recipe's; 0 = not dressed, as objects are."""
     kind = HOME_KIND.get(source.kind)
     if kind is not None and not kind.is_home:
         return 0
@@ -237,11 +234,7 @@ def _furnish(work: Preparation) -> Preparation:
 
 
 def _dress(work: Preparation) -> Preparation:
-    """Add surfaces, parts, lamps, textiles and clutter, by the source's seed.
-
-    Raises BadRecipe for an unknown style, BadInput if a path is not a library, MachineFailed if the
-    furniture package is not available.
-    """
+    """Add surfaces, parts, lamps, textiles and clutter by seed; BadRecipe, BadInput, MachineFailed."""
     from pbrs_farm.dress.dressing import dressed_house
     from pbrs_farm.repair.small_repairs import with_rooms_closed, without_persons_and_plants
 
@@ -260,11 +253,7 @@ def _dress(work: Preparation) -> Preparation:
 
 
 def _repair(work: Preparation) -> Preparation:
-    """Close walls, cut openings, find lamps; rehang pictures that lost their wall.
-
-    The gates of dressing apply to the rendered house: an item that loses its wall to repair is hung on
-    the remaining wall or removed, and the house is repaired again.
-    """
+    """Repair; items hung on walls that it changed are rehung or removed, and the house repaired again."""
     from pbrs_farm.dress.dressing import refit_after_repair
     from pbrs_farm.raycast.caster import Caster
     from pbrs_farm.repair import repair
@@ -356,10 +345,7 @@ STEP_GROUPS: Final = tuple(group for group in GROUPS if group != "dress")
 
 
 def versions_of_passes() -> dict[str, int]:
-    """Pass -> version, with a version for the readers of floor plans.
-
-    Installations with equal versions make the same house from the same source.
-    """
+    """Pass -> version, with one for readers of plans; equal ones make equal houses."""
     return {p.name: p.version for p in PASSES} | {"plans": PLANS_VERSION}
 
 
@@ -369,9 +355,6 @@ def cache_key(source: SourceRef, recipe: Recipe) -> str:
 
 
 def step_depends(source: SourceRef, recipe: Recipe) -> list[object]:
-    """Inputs of the step `house` beside STEP_GROUPS, for its digest.
-
-    The source's files, then a row for each pass of the house: name, version and its other inputs.
-    """
+    """Inputs of the step `house` beside STEP_GROUPS: files, then each pass's version and own inputs."""
     passes = [p for p in PASSES if p.is_needed(source, recipe)]
     return [source.fingerprint, *([p.name, p.version, *p.depends(source, recipe)] for p in passes)]

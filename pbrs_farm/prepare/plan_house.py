@@ -1,7 +1,4 @@
-"""Build a House from a floor plan, walls as meshes and furniture as boxes; or a home's file to furnish.
-
-Effects: reads the file. Furniture has no surfaces until prepare/stand_ins.py adds them.
-"""
+"""A House from a plan, with items to be filled by prepare/stand_ins.py, or a home's file. Reads the file."""
 
 from __future__ import annotations
 
@@ -33,10 +30,7 @@ LEFT_OUT = "plan-left-out"
 
 
 def house_of_plan(given: GivenFile, fields: ReadFields) -> House:
-    """The house of a plan, with an item for each piece of furniture. Raises BadInput, naming the place.
-
-    Furniture of an unknown class or without a box becomes a note. The house has no cameras.
-    """
+    """The house of a plan with an item (or note) for each piece of furniture; BadInput names the place."""
     path = given.path
     file = upright(plan_of_file(given, part_of(given.part)))
     notes = Notes(str(path), strict=fields.strict)
@@ -74,11 +68,7 @@ def _walls_of_plan(file: PlanFile, name: str, fields: ReadFields) -> House:
 
 
 def box_only_items(house: House, storeys: Sequence[PlanStorey]) -> tuple[Item, ...]:
-    """An item for each piece of furniture of a plan, on the levels of the house from the lowest up.
-
-    Raises ValueError unless there are as many storeys as levels. Ids count all furniture of a storey, also
-    pieces that give no item.
-    """
+    """An item for each drawable piece of furniture, numbered by storey; one storey per level, from below."""
     levels = sorted(house.levels, key=lambda level: level.elevation)
     items = []
     for number, (level, storey) in enumerate(zip(levels, storeys, strict=True)):
@@ -102,10 +92,7 @@ def box_only_items(house: House, storeys: Sequence[PlanStorey]) -> tuple[Item, .
 def furnish_plan_file(
     file: PlanFile, catalogue: Catalogue, *, seed: int, style: str = "", name: str = "home"
 ) -> GeneratedHome:
-    """A plan as a home's file: its furniture at its places, other rooms furnished by a seed.
-
-    Plans and seed decide, not the file's name: equal plans and seeds give equal homes.
-    """
+    """A plan as a home's file, its other rooms furnished by a seed; the file's name has no effect."""
     plans = [s.plan for s in file.storeys]
     key = repr(plans[0]) if len(plans) == 1 else repr(plans)
     file = upright(file)

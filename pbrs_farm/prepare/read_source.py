@@ -1,7 +1,4 @@
-"""The house of a source, by its format or its kind of home.
-
-Effects: reads the source's files and the cached packages; an example home is fetched through apt.
-"""
+"""The house of a source, by its format or its kind of home. Reads files and packages, maybe through apt."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Sources of houses: words of a command line -> SourceRefs, and the check that a source is unchanged.
-
-Effects: reads files, and the example homes' package from the cache (or through apt).
-"""
+"""Sources of houses by words of a command line, and the check that they are unchanged. Reads their files."""
 
 from __future__ import annotations
 
@@ -52,10 +49,7 @@ _ROOT_HINT: Final = (
 
 
 def variants(source: SourceRef, seeds: Sequence[int]) -> list[SourceRef]:
-    """The source dressed by each seed, as separate houses; the source itself for seed 0.
-
-    An object without context is never dressed and returned once.
-    """
+    """The source dressed by each seed, as separate houses, undressed for 0; an object alone, undressed."""
     if source.kind in HOME_KIND and not HOME_KIND[source.kind].is_home:
         return [source]
     if source.edits and any(seeds):
@@ -71,11 +65,7 @@ def variants(source: SourceRef, seeds: Sequence[int]) -> list[SourceRef]:
 
 
 def words_of_homes(words: Sequence[str]) -> list[str]:
-    """Expand words that name several homes into one word per home.
-
-    These are a range, `made:1..20`, and a folder: all homes in it of any format, by name, without its
-    subfolders unless they are homes. A folder without homes remains, so that `resolve` reports it.
-    """
+    """Expand ranges (`made:1..20`) and folders of homes into one word per home; other words remain."""
     homes: list[str] = []
     for word in words:
         kind = kind_of_word(word)
@@ -260,10 +250,7 @@ def _source_of(kind: str, location: str, files: SourceFiles, models: str, part: 
 
 
 def suncg_list(root: Path, list_file: Path) -> list[str]:
-    """The words `ROOT/house/<id>` for every id in a list file, without blank and # lines.
-
-    Raises BadHouse, with the line, for an id too long for a folder's name. The houses need not exist.
-    """
+    """The words `ROOT/house/<id>` of a list file without blank and # lines; BadHouse for a too long id."""
     ids = [line.strip() for line in text_given(list_file, error=BadHouse).splitlines()]
     for number, house in enumerate(ids, 1):
         if len(house.encode()) > _LONGEST_ID and not house.startswith("#"):

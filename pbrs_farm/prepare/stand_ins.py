@@ -99,11 +99,7 @@ def has_box_only_items(house: House) -> bool:
 
 
 def with_stand_ins(house: House, catalogue: Catalogue, how: How) -> House:
-    """Replace each box-only item by a piece, a box or nothing; notes list the omitted ones.
-
-    Pieces come from the catalogue, and their credits go into the source's attribution. how "none" omits
-    all of them, with a note of their number; only "pieces" reads the catalogue.
-    """
+    """Replace box-only items by pieces (credited), boxes or nothing (noted), as `how` says."""
     box_only = [item for item in house.items if BOX_ONLY in item.tags]
     if not box_only:
         return house

@@ -42,11 +42,7 @@ _NEAR_BEST: Final = 0.7  # of the largest plane's area, from which facing the ro
 
 
 def with_mirrors(house: House) -> tuple[House, tuple[str, ...]]:
-    """The house with working mirrors, and the ids of the changed items.
-
-    In a piece of another class, parts named mirror count. Pieces that already have a mirror material,
-    and pieces without a flat part, are unchanged.
-    """
+    """The house with working mirrors, also parts named mirror of other pieces, and the changed items' ids."""
     materials = list(house.materials)
     glass: dict[int, int] = {}  # material as read -> its mirror
     rooms = {room.id: room for room in house.rooms}
@@ -68,10 +64,7 @@ def with_mirrors(house: House) -> tuple[House, tuple[str, ...]]:
 
 
 def with_clear_panes(house: House) -> House:
-    """The house with transparent panes in cabinets, tables and shelves.
-
-    Panes are thin flat parts named glass with a single light, opaque colour.
-    """
+    """The house with transparent panes: thin flat parts named glass, of one light, opaque colour."""
     materials = list(house.materials)
     clear: dict[int, int] = {}  # material as read -> one that lets light through
     items = []

@@ -1,8 +1,4 @@
-"""Repair: a house as read -> a house that light cannot leak through, with a report.
-
-STEPS is the only list of steps, in their order. No effects. The ray caster is an argument; without
-one, leaks and light output are not measured.
-"""
+"""Repair: a house as read -> a house that light cannot leak through, by STEPS, with a report; no effects."""
 
 from __future__ import annotations
 
@@ -37,11 +33,7 @@ from pbrs_farm.repair.structure.watertight import Structure, repaired_structure,
 
 @dataclass(frozen=True, slots=True)
 class Repairing:
-    """A house on its way through the steps.
-
-    facts: fields of RepairReport and StructureReport so far. built: the walls, floors and ceilings,
-    None before the step `structure`.
-    """
+    """A house on its way through the steps; facts: report fields so far; built: set by `structure`."""
 
     house: House
     fields: RepairFields

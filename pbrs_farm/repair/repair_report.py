@@ -153,10 +153,7 @@ class FurnitureAudit(Record):
 
 
 class RepairReport(Record, extra="allow"):
-    """The changes to a house, and the measurements after them.
-
-    Facts of steps without a field here are sentences.
-    """
+    """The changes to a house, and the measurements after them; facts without a field are sentences."""
 
     __pydantic_extra__: dict[str, str]
 

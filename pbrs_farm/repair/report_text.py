@@ -12,11 +12,7 @@ if TYPE_CHECKING:
 
 
 def summary_of_report(report: RepairReport) -> str:
-    """The faults of a house and their repairs, one sentence per line.
-
-    English, for people; names from the source are shortened and stripped of control characters.
-    Programs read the report's fields instead.
-    """
+    """The faults of a house and their repairs, one sentence per line, names made printable."""
     if report.was_repaired:
         return f"{report.house_id} was repaired before; no changes."
     lines = [

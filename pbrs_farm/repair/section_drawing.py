@@ -18,11 +18,7 @@ _TEXT_M = 0.25  # height of letters
 
 
 def section_svg(before: House, after: House, level_id: str) -> str:
-    """Side by side: every wall of before with its outline, and the solid walls of after.
-
-    The section goes through doors and windows. Faults are visible before: walls that overlap, have
-    gaps or no thickness. SVG, plan with x right and z down, one unit per metre.
-    """
+    """Side by side: wall outlines before and solid walls after, in plan, one unit per metre."""
     # Section wall by wall before repair, the whole structure together after it.
     y = before.level(level_id).elevation + _CUT_M
     parts = [section_of_items([i], y) for i in before.items if i.kind is ItemKind.WALL]
@@ -68,11 +64,7 @@ def _xy(point: Sequence[float] | F64) -> str:
 
 
 def section_of_items(items: Sequence[Item], y: float) -> F64:
-    """(N, 2, 2) plan segments in which the items' triangles meet the height y.
-
-    (x, z) of both ends, metres. A triangle with a corner exactly at the height counts it as below.
-    Faces that lie in the cut give nothing.
-    """
+    """(N, 2, 2) plan segments (x, z) where the items' triangles cross the height y."""
     corners = corners_of_surfaces(s for i in items for s in i.surfaces)
     # Keep the triangles with corners on both sides of the cut.
     above = corners[:, :, 1] > y
@@ -94,11 +86,7 @@ def _meet(a: F64, b: F64, y: float) -> F64:
 
 
 def solid_polygons(segments: F64) -> list[shapely.Polygon]:
-    """The solid regions of a closed section: those with an odd number of edges to their right.
-
-    segments: (N, 2, 2), of closed surfaces; a gap of more than 10 micrometres opens its region, which
-    is then dropped. Touching cells are not merged.
-    """
+    """Solid regions of a closed section (N, 2, 2), an odd number of edges to their right; open ones dropped."""
     if not len(segments):
         return []
     # Snap to 10 micrometres, so that segments of neighbours share their ends.

@@ -21,11 +21,7 @@ _SQUARE = 1e-6  # axes of a box whose products differ more from 0 and 1 are no f
 
 
 def without_persons_and_plants(house: House, fields: RepairFields) -> tuple[House, list[Removed]]:
-    """Remove persons and plants, as the recipe says (paper section 3).
-
-    Each has a recipe field. Also returns the removed items; they are identified by the kind that the
-    reader set.
-    """
+    """Remove persons and plants, each if the recipe says so (paper section 3); also the removed items."""
     kinds = set()
     if fields.remove_persons:
         kinds.add(ItemKind.PERSON)
@@ -40,19 +36,12 @@ def without_persons_and_plants(house: House, fields: RepairFields) -> tuple[Hous
 
 
 def with_rooms_closed(house: House, fields: RepairFields) -> House:
-    """Add ceilings over walled rooms without one, if the recipe asks for it.
-
-    Otherwise returns the house itself. Added ceilings have a tag, for `rooms_with_added_ceilings`.
-    """
+    """Add tagged ceilings over walled rooms without one, if the recipe asks for it."""
     return with_ceilings(house) if fields.add_ceilings else house
 
 
 def with_white_walls(house: House, rgb: tuple[float, float, float]) -> tuple[House, int]:
-    """Walls whose source names no colour painted rgb (sRGB); and how many, baseboards aside.
-
-    A wall that has a colour or texture of its source keeps it. Other items that share the default
-    material are not painted: walls get a copy of it. The number is for the report.
-    """
+    """Walls of no colour in the source painted rgb (sRGB), and their number without baseboards."""
     materials = list(house.materials)
     white: dict[int, int] = {}  # material as read -> its white copy
     items: list[Item] = []
@@ -82,11 +71,7 @@ def with_white_walls(house: House, rgb: tuple[float, float, float]) -> tuple[Hou
 
 
 def with_sound_faces(house: House) -> tuple[House, FacesReport]:
-    """Drop faces without area or with a NaN corner, and make winding consistent.
-
-    A face opposite to its own shading normals is flipped. Emptied surfaces are kept, so that
-    LightPart.emitting stays valid.
-    """
+    """Drop faces without area or with NaN (emptied surfaces stay), and turn those against their normals."""
     n_dropped = n_turned = 0
     items = []
     for item in house.items:
@@ -126,10 +111,7 @@ def _against_normals(surface: Surface, faces: I32) -> Bools:
 
 
 def _in_closed_shells(positions: F32, faces: I32) -> Bools:
-    """(F,) true for faces of closed and consistently wound connected parts.
-
-    Each edge of such a part has one face in each direction, so that turning single faces would open it.
-    """
+    """(F,) true for faces of closed, consistently wound parts, which a single turned face would open."""
     _, welded = numbered_points(positions[faces.ravel()].astype(np.float64))
     corners = welded.reshape(-1, 3)
     starts, ends = corners.ravel(), np.roll(corners, -1, 1).ravel()
@@ -143,10 +125,7 @@ def _in_closed_shells(positions: F32, faces: I32) -> Bools:
 
 
 def with_boxes_of_meshes(house: House) -> House:
-    """Every item's box taken from its triangles, along the axes it has: a source's is its plan's.
-
-    A box that its mesh does not fill is made smaller, one that a bulb sticks out of larger.
-    """
+    """Every item's box, along its own axes, taken from its triangles."""
     return house.with_items(map(_with_box_of_mesh, house.items))
 
 

@@ -20,11 +20,7 @@ _ROUNDS = 5  # of looking again; more houses than that do not come in while a te
 
 
 def write_attribution(store: Store) -> None:
-    """Write ATTRIBUTION.txt where a house of the root shows what must be credited.
-
-    Other workers may finish houses meanwhile: it looks again after writing, and stops when nothing
-    is new. A root whose houses ask for no credit gets no file.
-    """
+    """Write ATTRIBUTION.txt if anything needs credit; looks again until no other worker's house is new."""
     last_rows: list[dict[str, str]] | None = None
     for _round in range(_ROUNDS):
         rows = dressing_rows(get_or_none(store, keys.MANIFEST) or b"")
@@ -35,10 +31,7 @@ def write_attribution(store: Store) -> None:
 
 
 def write_attribution_of(store: Store, rows: Sequence[dict[str, str]]) -> None:
-    """Write ATTRIBUTION.txt of these dressing_rows, where they ask for one.
-
-    Left alone where it is equal already; an old file is not removed when no row asks for one.
-    """
+    """Write ATTRIBUTION.txt of these dressing_rows, unless it is equal or nothing needs credit."""
     homes = (row.get("attribution", "") for row in rows)
     text = attribution_text(homes, _credits(store, (row["key"] for row in rows)))
     if not text:

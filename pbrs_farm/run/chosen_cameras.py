@@ -16,10 +16,7 @@ from pbrs_farm.sample.house_sampler import add_rig_views
 
 
 def chosen_cameras(house: House, recipe: Recipe, seed: int, caster: Caster) -> Sampling:
-    """The views by cameras.source, those of all cameras of a rig included, and the report.
-
-    caster: of this house, panes included. Raises BadInput for a file without cameras.
-    """
+    """The views by cameras.source with all cameras of rigs, and the report; BadInput without cameras."""
     fields = recipe.judged_cameras
     source, content = source_of(fields), file_content(fields)
     options = source.options_of(fields.source)
@@ -30,10 +27,7 @@ def chosen_cameras(house: House, recipe: Recipe, seed: int, caster: Caster) -> S
 
 
 def file_content(fields: CameraFields) -> Any:
-    """The parsed camera file or trajectory of a source that needs one; None for other sources.
-
-    Raises BadInput for a file that cannot be read or parsed.
-    """
+    """The parsed camera file or trajectory of a source that needs one, else None; BadInput if damaged."""
     parse = source_of(fields).parse
     return parse(camera_file_text(fields), fields) if parse is not None else None
 

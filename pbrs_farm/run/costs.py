@@ -1,8 +1,4 @@
-"""Estimated cost of a run: CPU and GPU seconds, bytes, files, from measured constants; no effects.
-
-The constants come from generated homes on one machine, without the light of single scenes: they tell an
-hour from a month and are not right to ten per cent.
-"""
+"""Estimated cost of a run, from constants measured on one machine, to an order of magnitude; no effects."""
 
 from __future__ import annotations
 

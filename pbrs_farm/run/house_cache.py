@@ -60,11 +60,7 @@ class CachedHouse:
 
     @cached_property
     def house(self) -> House:
-        """The house as its bundle holds it.
-
-        Loaded once. BadHouse for a damaged bundle; StoreFailed where it is not there, as before the
-        step `house`.
-        """
+        """The house as its bundle holds it, loaded once; BadHouse for damage, StoreFailed without it."""
         from pbrs_farm.formats.house_bundle import house_from_bundle
 
         get = self.store.get
@@ -96,10 +92,7 @@ class CachedHouse:
         return MovingHouse(self.house, self.geometry)
 
     def at(self, time_s: float | None) -> Moment:
-        """The house at a time in seconds; at rest for None, and if nothing moves.
-
-        All times share the static parts; the last few times are cached.
-        """
+        """The house at a time in seconds (None: at rest), static parts shared; the last few are cached."""
         if time_s is None or not self.house.motions:
             return Moment(self.house, self.geometry, self.caster)
         if time_s not in self._moments:
@@ -145,10 +138,7 @@ class CachedHouse:
         return sky_for_house(self.recipe, self.house_id, panorama=panorama)
 
     def view(self, view_id: str, cameras_digest: str) -> View:
-        """The view with an id; BadInput if the house does not have it.
-
-        cameras_digest: of the cameras step's marker; another digest reads cameras.json again.
-        """
+        """The view with an id, read again if the digest of the cameras step changes; BadInput without it."""
         views = self.views(cameras_digest)
         if view_id not in views:
             key = keys.house_key(self.house_id, "cameras.json")
@@ -179,11 +169,7 @@ class CachedHouse:
 
 
 def decoded_textures(house: House) -> tuple[dict[str, NDArray[np.uint8]], list[str]]:
-    """Decoded textures by id, and the ids of those that cannot be read.
-
-    (H, W, 3 or 4) uint8 sRGB each. An unreadable picture is no error: its surfaces keep the plain
-    colour of their material, and the caller decides whether to tell.
-    """
+    """(H, W, 3 or 4) uint8 sRGB by id, and the ids of unreadable ones, whose surfaces stay plain."""
     from pbrs_farm.images import decode_texture
 
     decoded: dict[str, Any] = {}
@@ -197,20 +183,14 @@ def decoded_textures(house: House) -> tuple[dict[str, NDArray[np.uint8]], list[s
 
 
 class HouseCache:
-    """The last house of this process.
-
-    before_edits: the last house before its edits, which outlasts the houses made from it.
-    """
+    """The last house of this process, and the last before its edits, which outlasts those made from it."""
 
     def __init__(self) -> None:
         self.before_edits = HouseBeforeEdits()
         self._held: tuple[tuple[str, str, str, str], CachedHouse] | None = None
 
     def get(self, store: Store, recipe: Recipe, house_id: str, digest: str) -> CachedHouse:
-        """The loaded house, the same object while its inputs are the same.
-
-        Another house, digest or recipe closes the cached one first, so do not keep the result across calls.
-        """
+        """The loaded house, the same while its inputs are; another one closes the cached house."""
         # Scenes depend on the recipe, too.
         key = (store.url, house_id, digest, recipe.digest())
         if self._held is None or self._held[0] != key:

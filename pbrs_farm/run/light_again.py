@@ -1,7 +1,4 @@
-"""Light of stored views traced again for `verify ROOT --light`: small pictures by new random numbers.
-
-Effects: reads the root; holds the scenes of one house.
-"""
+"""Light of stored views traced again, small, by new random numbers, for `verify --light`; holds scenes."""
 
 from __future__ import annotations
 
@@ -24,11 +21,7 @@ _SPP: Final = 64
 
 
 class LightAgain:
-    """Traces light of the views of an output root, one house after the other.
-
-    Lamps, sky, surfaces and path length are those of the recipe and the stored house; the integrator is
-    always `path`, with a box for each pixel.
-    """
+    """Traces light of a root's views by `path`, house after house, with the recipe's lamps and sky."""
 
     def __init__(self, root: Path) -> None:
         """Raises BadInput or BadRecipe for a root without a readable recipe.json."""
@@ -44,10 +37,7 @@ class LightAgain:
     def light(
         self, house_id: str, view_id: str, width_px: int, height_px: int
     ) -> Mapping[str, F32]:
-        """The radiance (H, W, 3) of both light groups in a stored view, at another size.
-
-        Raises BadInput for a house that cannot be read, RenderFailed where no light reaches the view.
-        """
+        """The radiance (H, W, 3) of both light groups at another size; BadInput, or RenderFailed if dark."""
         house = self._cache.get(self._store, self._recipe, house_id, "")
         views = house.views("")
         setup = ViewSetup(house, house.view(view_id, ""), views)

@@ -1,7 +1,4 @@
-"""A checkpoint of a view's light, written every minute, from which a killed run resumes.
-
-Effects: reads and writes one object of the store, reads a clock.
-"""
+"""A checkpoint of a view's light, written every minute, from which a killed run resumes; uses store and clock."""
 
 from __future__ import annotations
 

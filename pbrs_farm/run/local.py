@@ -1,7 +1,4 @@
-"""A run on this machine, no server: the steps of every house through a pool of processes.
-
-Effects: the store's, and worker processes.
-"""
+"""A run on this machine, no server: the steps of every house through a pool of processes."""
 
 from __future__ import annotations
 
@@ -27,10 +24,7 @@ from pbrs_farm.store import store_from_url
 
 
 def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:
-    """Do everything that is not done yet; a fault costs its step and the run goes on.
-
-    Raises BadRecipe when the root holds another recipe, StoreFailed when it cannot be written.
-    """
+    """Do everything that is not done yet; a fault costs its step. BadRecipe for another recipe, StoreFailed."""
     store = store_from_url(run.store_url, run.store)
     summary = Summary()
     summary.failures += [(shown(word, MAX_PLACE), text, "") for word, text in run.refused]

@@ -33,11 +33,7 @@ def attribution(store: Store, house_id: str) -> str:
 
 
 def finish_house(store: Store, house_id: str) -> int:
-    """Write the house's manifest if it changed, and remove the checkpoints of done steps.
-
-    Returns the number of objects that the markers list, whether or not the files exist. An equal manifest is
-    not written again, since its date is that of the house's last change.
-    """
+    """Write the house's manifest if it changed, remove old checkpoints; the number of listed objects."""
     read_markers = [read_marker(store, k) for k in store.list(keys.house_key(house_id, "done/"))]
     markers = [marker for marker in read_markers if marker is not None]
     data = manifest_from_markers(markers, attribution(store, house_id))
@@ -68,10 +64,7 @@ def finish_root(store: Store, houses: Iterable[str]) -> None:
 
 
 def claim_root(store: Store, recipe: Recipe, *, update: bool) -> None:
-    """One output root holds one recipe: write recipe.json, or refuse another with what differs.
-
-    update: replace it; steps that use the changed fields will run again. Raises BadRecipe.
-    """
+    """One root holds one recipe: write it (or replace it, to update), or BadRecipe with what differs."""
     data = json_bytes(recipe)
     if store.put_if_absent(keys.RECIPE, data):
         return
@@ -109,10 +102,7 @@ def pull(of: Store, folder: Path, tell: Callable[[int], None] = lambda _n: None)
 
 @contextmanager
 def as_files(word: str, settings: StoreSettings) -> Iterator[Path]:
-    """The folder of an output root; for a URL or a packed root a temporary copy of all of it.
-
-    Yields a folder unchanged if it is not a root.
-    """
+    """The folder of an output root; for a URL or a packed root a temporary copy of all of it."""
     if "://" not in word and not (Path(word) / LAYOUT).is_file():
         yield Path(word)
         return

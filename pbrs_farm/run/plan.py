@@ -122,10 +122,7 @@ def step_digest(
     inputs: Mapping[str, str],
     extra: object = None,
 ) -> str:
-    """Digest of a step. inputs: step name -> digest of its marker, for those that exist.
-
-    extra: what else it depends on (the source's fingerprint, the camera, optional layers).
-    """
+    """Digest of a step by its inputs (step -> digest of its marker) and extra dependencies."""
     return keys.digest(
         step.name,
         step.version,
@@ -148,10 +145,7 @@ def lit_views(
     floor_lux: Mapping[str, Mapping[str, float]],
     least_lx: float,
 ) -> tuple[list[tuple[str, str, float]], list[str]]:
-    """The rows (view id, room id, score) of bright rooms, and the reasons for omitting others.
-
-    floor_lux: room id -> lx by light group, of the step illuminance; views of rooms without a row remain.
-    """
+    """(view id, room id, score) of bright rooms (or without lx), and the reasons for omitting others."""
     bright: list[tuple[str, str, float]] = []
     left_out: dict[str, int] = {}
     for row in rows:
@@ -168,10 +162,7 @@ def lit_views(
 
 
 def chosen_views(rows: Iterable[tuple[str, str, float]], n_views: int, recipe: Recipe) -> list[str]:
-    """The n_views views to make: the first frames of a sequence, else spread over rooms; 0 = all.
-
-    The cameras of a rig count as one view at each instant; all of them are made or none.
-    """
+    """The n_views (0 = all) ids to make: first frames, else spread over rooms; a rig's instant is one."""
     all_rows = {row[0]: row for row in rows}
     first_of = {view: recipe.shot(view).first.id for view in all_rows}
     # A plugin's id may end like that of a rig's camera: then there is no such first view.
@@ -185,10 +176,7 @@ def chosen_views(rows: Iterable[tuple[str, str, float]], n_views: int, recipe: R
 
 
 def spread(view_rooms: Iterable[tuple[str, str, float]], n_views: int) -> list[str]:
-    """The n_views views to make of (view id, room id, score): best first, room after room in turn.
-
-    All of them, in the given order, when n_views is 0.
-    """
+    """The n_views ids of (view id, room id, score): best first, room after room; all, in order, for 0."""
     rows = list(view_rooms)
     if n_views <= 0 or n_views >= len(rows):
         return [view for view, _room, _score in rows]

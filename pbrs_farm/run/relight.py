@@ -132,10 +132,7 @@ def lamp_factors(rows: Sequence[Mapping[str, Any]], words: Sequence[LampFactor])
 
 
 def unlit_lamps(view: Path, words: Sequence[LampFactor]) -> list[dict[str, Any]]:
-    """The rows of lamps that words name one by one and that bring no light to a view.
-
-    Words with a * do not count. BadInput as of `lamp_factors`.
-    """
+    """The rows of lamps named by words without * that bring no light to a view; BadInput as `lamp_factors`."""
     rows = lamps_of_view(view)
     named = lamp_factors(rows, [w for w in words if "*" not in w.word])
     return [row for row in rows if int(row["number"]) in named and not row["layer"]]
@@ -160,10 +157,7 @@ _VIEW: Final = re.compile(
 
 @contextmanager
 def folder_of_view(word: str, settings: StoreSettings, *, needs_light: bool) -> Iterator[Path]:
-    """The folder of a view: the one that word names, or a copy of what relighting reads of a URL's.
-
-    needs_light: radiance.exr too. Raises BadInput where word names no view, or its store lacks one.
-    """
+    """The folder of a view, or a copy of a URL's (with radiance.exr if needs_light); BadInput."""
     if "://" not in word:
         if not (Path(word) / "view.json").is_file():
             raise BadInput(word, "view.json", "no such file", hint="OUT/houses/HOUSE/views/VIEW")

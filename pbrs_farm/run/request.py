@@ -229,11 +229,7 @@ class Wanted(Record):
 
 
 def wanted_of(request: Wanted) -> Wanted:
-    """The `Wanted` of a request or of a job of the farm, with layers in the table's order.
-
-    Adds the layers that others need. Raises BadInput for a layer that is not installed here, and for one
-    made of light if none is traced.
-    """
+    """The `Wanted` of a request or job, its layers and those they need in order; BadInput for unusable ones."""
     want = Wanted(**{name: getattr(request, name) for name in Wanted.model_fields})
     for layer in want.layers:
         if layer not in LAYER:

@@ -1,7 +1,4 @@
-"""Run a task in a render process: its steps, with an event for each.
-
-Effects: those of the store and of the steps' libraries; a crash here costs one step.
-"""
+"""Run the steps of a task in a render process, with an event for each; a crash costs one step."""
 
 from __future__ import annotations
 
@@ -56,11 +53,7 @@ _OF_FINISHING = (
 
 
 def make_handler(send: Send) -> Handler:
-    """The handler of a render process: it keeps the house it worked on last loaded.
-
-    The handler answers each line with "done", when all steps have run or were left out; faults of
-    steps are messages before it. The house is freed when the process ends.
-    """
+    """The handler of a render process: answers each line with faults and "done", keeps the last house."""
     house_cache = HouseCache()
     atexit.register(house_cache.clear)
 
@@ -97,11 +90,7 @@ def _load(modules: Sequence[str]) -> None:
 
 
 def run_task(send: Send, setting: Setting, house_cache: HouseCache, task: RenderTask) -> None:
-    """Run the steps of one task.
-
-    A failed step does not raise: its error is sent, and the steps that read its files are skipped, except
-    `view`, which lists the existing files.
-    """
+    """Run the steps of a task; a fault is sent, and steps that need its files are skipped, except `view`."""
     work = Work(
         store=store_from_url(setting.store_url, setting.store),
         recipe=setting.recipe,

@@ -42,10 +42,7 @@ class _Unit:
 
 
 class Schedule:
-    """Houses in order, each followed by its views.
-
-    is_apart: one process renders light, another does the rest.
-    """
+    """Houses in order, each followed by its views; is_apart: one process renders light, another the rest."""
 
     def __init__(
         self,
@@ -71,11 +68,7 @@ class Schedule:
             self._begin_house(self._houses.popleft(), RENDER)
 
     def drive(self, pool: Pool) -> None:
-        """Run until no task waits or runs.
-
-        Idle processes are served first, each with the house it holds; then events, which may add tasks. Returns
-        also when everything failed: the result is in the reports.
-        """
+        """Run until no task waits or runs, idle processes first, then events; also when all failed."""
         while self._houses or any(self._waiting.values()) or pool.n_busy:
             for lane in self._waiting:
                 for house in pool.idle_houses(lane):

@@ -84,10 +84,7 @@ class Outcome:
 def run_unless_done(
     name: str, work: Work, function: Callable[[Work], StepOutput], *, attempt: int = 1
 ) -> Outcome:
-    """Do one step unless its marker says it is done. Raises PbrsError; nothing half-done is left.
-
-    Raises BadInput if a step before it has not been done.
-    """
+    """Do one step unless its marker says it is done; PbrsError, nothing half-done is left."""
     found = _looked_up(name, work)
     key, old, is_valid, work = found.key, found.old, found.is_valid, found.work
     if old is not None and found.is_done and not _must_trace_again(old, work):
@@ -165,11 +162,7 @@ def _must_trace_again(old: Marker, work: Work) -> bool:
 
 
 def drop_radiance(work: Work) -> None:
-    """Remove the light of a view whose pictures are done; its step stays done, without a file.
-
-    The marker changes before the file is removed. A process killed between them leaves a file that no marker
-    lists, which the next call removes.
-    """
+    """Remove the light of a view whose pictures are done, marker first; its step stays done."""
     key = keys.marker_key(work.house_id, "light", work.view_id)
     marker = read_marker(work.store, key)
     if marker is None or not _looked_up("develop", work).is_done:

@@ -1,7 +1,4 @@
-"""The steps of a run: each reads the store, calls one stage and gives the bytes of its files.
-
-Effects: reads the store; run/step_cache.py writes what a step gives, and its marker.
-"""
+"""The steps of a run: each reads the store, calls one stage and gives the bytes that step_cache.py writes."""
 
 from __future__ import annotations
 
@@ -218,10 +215,7 @@ def _truth(work: Work) -> StepOutput:
 def _partners(
     setup: ViewSetup, layers: Sequence[str], table: dict[str, Any]
 ) -> tuple[dict[Relation, Camera], dict[Relation, OtherTime]]:
-    """The cameras of the partners that the layers need, and the house then, where it has moved.
-
-    They are written into the table.
-    """
+    """Cameras of the partners that the layers need, also entered into the table, and the moved houses then."""
     needed = {LAYER[name].partner for name in layers} - {""}
     if not needed:
         return {}, {}
@@ -399,10 +393,7 @@ def run_step(name: str, work: Work, *, attempt: int = 1) -> Outcome:
 
 @functools.cache
 def versions() -> Mapping[str, str]:
-    """Versions of what makes the pictures; found once a process.
-
-    "-" for a package that is not installed.
-    """
+    """Versions of what makes the pictures, "-" if not installed; found once a process."""
     by_name = {"pbrs_farm": pbrs_farm.__version__, "python": platform.python_version()}
     for package in ("mitsuba", "drjit", "moderngl", "pyoidn", "numpy"):
         try:

@@ -1,7 +1,4 @@
-"""A home before and after it is dressed, from the same camera; effects: Mitsuba scenes.
-
-The camera is chosen on the dressed home, as a run of the same recipe would choose it.
-"""
+"""A home before and after it is dressed, from cameras chosen on the dressed home; effects: Mitsuba scenes."""
 
 from __future__ import annotations
 
@@ -34,10 +31,7 @@ class ViewPair:
 
 
 def pairs(bare: House, dressed: House, recipe: Recipe, n_views: int) -> Iterator[ViewPair]:
-    """The best views of the dressed home, one a room first, and the same of the bare home.
-
-    Both houses are repaired. n_views: at most.
-    """
+    """At most n_views best views of the dressed home, one a room first, and of the bare one, both repaired."""
     from pbrs_farm.raycast.caster import Caster
     from pbrs_farm.sample.house_sampler import sample_cameras
 

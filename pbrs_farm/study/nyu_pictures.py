@@ -42,10 +42,7 @@ NYU_HOME: Final = "NYUv2"  # home in the ids of its pictures
 
 
 def nyu_pictures(path: Path, plan: TrainingPlan, split: str) -> Iterator[RealFrame]:
-    """The pictures of a split of splits.mat ("train", "test"), or "all"; ids have four digits.
-
-    Raises BadInput for another file, or one without the truth of the plan's task.
-    """
+    """The pictures of a split of splits.mat ("train", "test"), or "all", ids of four digits; BadInput."""
     numbers = None if split == "all" else _numbers_of_split(path, split)
     mapping = path.parent / "classMapping40.mat"
     classes = _class_map(mapping) if plan.task == "segmentation" else np.zeros(0, np.uint8)

@@ -51,11 +51,7 @@ def cropped_frame(
 
 
 def arrays_of_frames(frames: Iterable[RealFrame], plan: TrainingPlan) -> ViewArrays:
-    """Training arrays of frames: colour and truth at the plan's size.
-
-    Labels take the nearest pixel, lines stay connected. Depth beside normals serves scoring only
-    and is left out.
-    """
+    """Training arrays of colour and truth, without depth beside normals, at the plan's size."""
     ids, rows = [], []
     for frame in frames:
         ids.append(frame.id)

@@ -12,10 +12,7 @@ from torch import Tensor
 
 
 def rays_of_cameras(cameras: Tensor, height: int, width: int) -> Tensor:
-    """(B, H, W, 2) rays through the centres of the pixels.
-
-    cameras: (B, 4) fx, fy, cx, cy in pixels of that size, from the corner of the picture.
-    """
+    """(B, H, W, 2) rays of the pixels' centres; cameras: (B, 4) fx, fy, cx, cy in pixels, from the corner."""
     fx, fy, cx, cy = cameras.float().unbind(1)
     columns = torch.arange(width, device=cameras.device) + 0.5
     rows = torch.arange(height, device=cameras.device) + 0.5

@@ -41,11 +41,7 @@ class PlaneFit:
 def normals_of_depth(
     depth_m: NDArray[Any], K: F64, fit: PlaneFit | None = None
 ) -> tuple[F32, Mask]:
-    """(H, W, 3) float32 unit normals towards the camera (x right, y down, z forward), and (H, W) a mask.
-
-    depth_m: (H, W) metres along the axis, 0 = unknown. K: (3, 3) pixels, centres at 0.5. Normals
-    outside the mask are 0.
-    """
+    """(H, W, 3) normals towards the camera and (H, W) mask, of depth in metres and K (centres at 0.5)."""
     fit = fit or PlaneFit()
     depth = np.asarray(depth_m, np.float64)
     inverse = np.where(depth > 0, 1 / np.where(depth > 0, depth, 1.0), 0.0)

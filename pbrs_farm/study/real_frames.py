@@ -61,11 +61,7 @@ class PhotoCamera:
 
 
 def real_pairs(folder: Path, plan: TrainingPlan) -> tuple[PhotoFiles, ...]:
-    """The pairs below a folder with truth of the plan's task; BadInput without any.
-
-    Classes exist for pairs in ScanNet's layout with labels, and for pairs of SUN RGB-D that are in
-    its toolbox.
-    """
+    """Pairs with truth of the plan's task (classes: ScanNet's labels, SUN RGB-D's toolbox); BadInput."""
     pairs = pairs_in(folder)
     if plan.task == "segmentation":
         pairs = tuple(pair for pair in pairs if has_labels_of(pair))
@@ -96,10 +92,7 @@ def digest_of_picture(pair: PhotoFiles) -> str:
 
 
 def read_pair(pair: PhotoFiles, depth_scale: float | None) -> Photo:
-    """The photograph with depth in mm; BadInput names a damaged file.
-
-    depth_scale: units per metre; None = as its layout stores depth.
-    """
+    """The photograph with depth in mm (depth_scale: units per metre, None = its layout's); BadInput."""
     return photo_from_pair(pair, depth_scale=depth_scale, sun_rgbd=_is_of_sun_rgbd(pair))
 
 
@@ -141,10 +134,7 @@ def _is_of_sun_rgbd(pair: PhotoFiles) -> bool:
 
 
 def camera_of(folder: Path, top: Path) -> PhotoCamera:
-    """The camera of a folder of pictures: the nearest intrinsics file from it up to top.
-
-    Raises BadInput if it is missing or damaged.
-    """
+    """The camera of the nearest intrinsics file from a folder up to top; BadInput without a sound one."""
     camera = find_camera(folder, top)
     if camera is not None:
         return camera

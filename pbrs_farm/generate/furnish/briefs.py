@@ -110,11 +110,7 @@ def brief_of(
     rng: np.random.Generator,
     use: UseWithoutType | None = None,
 ) -> RoomBrief:
-    """Required, optional and filler furniture of a room, by its type and the rest of the home.
-
-    shelf: the pieces to make templates of; groups without any piece are not required. rng: draws the
-    optional parts, and whether a bedroom is a child's. use: the brief to take instead of the type's.
-    """
+    """Required, optional (drawn) and filler furniture, of the shelf's groups, by the room's type or `use`."""
     type_ = plan.rooms[space.number].type
     name: str = use or (RoomType.LIVING if type_ is RoomType.STUDIO else type_)
     if use is None and type_ is RoomType.BEDROOM and _is_childs(plan, space, rng):

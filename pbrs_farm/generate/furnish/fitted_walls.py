@@ -42,10 +42,7 @@ def _fitted(
     before: float = 0.7,
     longest: float = _LONGEST_M,
 ) -> tuple[Template, ...]:
-    """One piece of a group as long as each stretch of wall (metres, of free_stretches), and as high as the room.
-
-    before: free in front of it. Rank grows with length: the longest wall that leaves a way is filled.
-    """
+    """A piece as long as each stretch (metres) and as high as the room, `before` free; the longest ranks first."""
     pieces = shelf.of(group, depth=(0.1, deepest))
     templates = []
     for width in dict.fromkeys(min(s - 2 * BESIDE_M - 0.004, longest) for s in stretches):

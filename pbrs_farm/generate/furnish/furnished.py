@@ -83,12 +83,7 @@ def arrangement_of(
     *,
     n_standing: int = 0,
 ) -> Arrangement:
-    """Arrange a room: all required groups, then optional ones, then fillers up to its density.
-
-    obstacles: rectangles of furniture in adjoining open rooms. n_standing: existing pieces in the room,
-    which count towards its density. If required groups do not fit in the brief's order, other orders
-    are tried.
-    """
+    """Arrange required, then optional groups, then fillers, in another order if the brief's does not fit."""
     walk = WalkMap(space, obstacles)
     groups = [g for g in brief.groups if g.templates or _is_kitchen(g, brief)]
     places = [

@@ -53,10 +53,7 @@ class FurnishReport:
 def furnish_report(
     plan: Plan, pieces: tuple[PlacedPiece, ...], catalogue: Catalogue
 ) -> FurnishReport:
-    """Check a furnished plan for missing, blocked or overlapping pieces, by room, and measure it.
-
-    Pieces that the catalogue does not have are not required.
-    """
+    """Check a furnished plan for missing (of those in the catalogue), blocked or overlapping pieces."""
     broken, walked, area = [], 0.0, 0.0
     grounds = [_ground_rect(p) for p in pieces]
     for number, room in enumerate(plan.rooms):

@@ -109,11 +109,7 @@ def _sold_with(sink: Piece, pieces: list[Piece], *, alone: bool = False) -> list
 def kitchen_places(
     units: Units, space: FurnishSpace, rng: np.random.Generator, *, wanted: float
 ) -> list[Standing]:
-    """Every run of kitchen units that a room allows, each as one template with its score.
-
-    units: sink, cooker, fridge and cabinets of one depth. wanted: metres of modules that the run should
-    have; shorter runs score less. A run keeps doors free and its cooker off windows.
-    """
+    """Every run of units that keeps doors free and its cooker off windows; wanted: metres of modules."""
     standings: list[Standing] = []
     for arms in run_shapes(space):
         length = sum(a.length for a in arms)

@@ -120,10 +120,7 @@ def _free(space: FurnishSpace, wall: RoomWall) -> list[tuple[float, float]]:
 
 
 def _span_along_wall(rect: Rect, strip: Rect, wall: RoomWall) -> tuple[float, float] | None:
-    """The part of a wall, from and to along it in metres, that a rectangle in a strip along it takes.
-
-    None where the rectangle does not reach into the strip.
-    """
+    """(from, to) along a wall, metres, that a rectangle takes of the strip along it; or None."""
     if min(rect[2], strip[2]) - max(rect[0], strip[0]) < 0.01:
         return None
     if min(rect[3], strip[3]) - max(rect[1], strip[1]) < 0.01:

@@ -182,11 +182,7 @@ def _free(
 def _out(
     shelf: Shelf, table: Piece, chair: Piece, u: float, turns: int, most: float = _UNDER_TABLE_M
 ) -> float:
-    """Distance from a table's edge to the centre of a chair pushed in as far as both allow.
-
-    u: position along that edge, in the table's frame. most: limit set by other chairs, negative if
-    the chair must keep off.
-    """
+    """Distance from a table's edge, at u, to the centre of a chair pushed in up to `most` or the first contact."""
     offset = -u if turns == 2 else u
     under = shelf.under_m(chair, table, offset, turns, _UNDER_TABLE_M)
     return chair.size[1] / 2 - min(under, most)

@@ -1,7 +1,4 @@
-"""Pieces of a catalogue by group and size, as one home chooses them; no effects.
-
-A home has one order of preference: it asks twice for a chair and gets the same one.
-"""
+"""Pieces of a catalogue by group and size, in one order of preference per home; no effects."""
 
 from __future__ import annotations
 
@@ -46,10 +43,7 @@ MAX_CHOICES = 6  # preferred pieces of a kind to try at every place
 
 
 def style_of(name: str, rng: np.random.Generator) -> str:
-    """The style of that name; one by seed for none. Raises BadInput for an unknown one.
-
-    The draw is made even where a name is given, so that all later draws of the seed are the same.
-    """
+    """The style of that name, or one by seed (drawn in any case); BadInput for an unknown one."""
     if name and name not in STYLES:
         raise BadInput("--style", name, "no such style", hint=f"one of {', '.join(STYLES)}")
     drawn = sorted(STYLES)[int(rng.integers(len(STYLES)))]

@@ -56,11 +56,7 @@ class Places:
         return Standing(template, WallFrame(x, z, dx, dz), float(self.scores[k]))
 
     def free_of(self, alive: Bools, standing: Standing) -> Bools:
-        """Mask of places that remain possible after adding a template.
-
-        alive: (N,) bool, possible so far; a copy is returned. Bodies may not overlap bodies or areas to
-        keep free; free areas may overlap each other.
-        """
+        """Mask (N,) of alive places that remain after a template: bodies overlap neither bodies nor free areas."""
         bodies, clear = _rect_array(standing.bodies), _rect_array(standing.clear)
         taken = np.concatenate([bodies, clear])
         # Test only places that are still possible.
@@ -71,11 +67,7 @@ class Places:
         return remaining
 
     def best(self, alive: Bools, n: int = _BEST) -> list[Standing]:
-        """The best places, no two of a wall closer than 0.4 m while others are there.
-
-        Best first; where too few are far enough apart, those beside them follow. Equal scores keep
-        their order.
-        """
+        """The best places first, those of a wall 0.4 m apart as long as there are others."""
         order = np.argsort(-self.scores, kind="stable")
         rows = order[alive[order]]
         names = [template.name for template in self.templates]
@@ -94,10 +86,7 @@ class Places:
 
 
 def overlap(rects: F64, others: F64) -> Bools:
-    """Whether rectangles overlap others by more than 2 mm.
-
-    rects: (N, B, 4) x0, z0, x1, z1, B rectangles of each of N places; others: (M, 4). Gives (N, B).
-    """
+    """(N, B) whether rectangles (N, B, 4) x0, z0, x1, z1 overlap others (M, 4) by more than 2 mm."""
     if not len(others) or not rects.size:
         return np.zeros(rects.shape[:2], bool)
     a, b, e = rects[:, :, None, :], others[None, None], _TOUCH_M
@@ -111,11 +100,7 @@ def overlap(rects: F64, others: F64) -> Bools:
 
 
 def places_of(group: PieceGroup, space: FurnishSpace, rng: np.random.Generator) -> Places:
-    """Every place of every template of a group that walls, doors and windows allow, best first.
-
-    Scores are those of `Liking` plus a little noise from rng, so that equal places differ by home.
-    Other furniture is not looked at: place_search.py takes places that do not overlap.
-    """
+    """Places of a group's templates that walls and openings allow, best first by `Liking` plus noise of rng."""
     versions = [v for template in group.templates for v in _versions(template)]
     frames, scores, template_of = [], [], []
     for number, template in enumerate(versions):
@@ -169,10 +154,7 @@ def frames_array(frames: Sequence[WallFrame]) -> F64:
 
 
 def allowed(template: Template, frames: F64, space: FurnishSpace) -> Bools:
-    """(N,) which frames keep a template inside the room, off doors and below window sills.
-
-    frames: (N, 4) x, z of the origin, and the unit vector along the wall. Two millimetres are given.
-    """
+    """(N,) which frames (x, z, unit vector along the wall) keep a template inside, off doors and below sills."""
     bodies = _rects_in_frames(np.array([s.rect for s in template.bodies]), frames)
     bad = overlap(bodies, np.concatenate([space.outside, space.doors])).any(1)
     if template.clear:

@@ -89,11 +89,7 @@ class FurnishSpace:
 
 
 def room_space(plan: Plan, number: int) -> FurnishSpace:
-    """The free space of a room of the plan.
-
-    It includes doors, windows and sides open to a neighbour, each with the area to keep free in front
-    of it, but no furniture: see `with_bodies`.
-    """
+    """The space of a room with openings and their areas to keep free, without furniture (`with_bodies`)."""
     room = plan.rooms[number]
     polygon = Polygon(room.polygon)
     neighbours = _open_neighbours(plan, number)
@@ -169,11 +165,7 @@ def free_stretches(space: FurnishSpace, least: float) -> tuple[float, ...]:
 
 
 def outside_of(polygon: Polygon) -> F64:
-    """(N, 4) rectangles: the rim around a rectilinear polygon, and the rest of its bounds.
-
-    The rim is 3 m wide, so that a piece which extends beyond the room hits it. Cells of slanted sides
-    count as outside.
-    """
+    """(N, 4) rectangles outside a polygon within its bounds and a rim of 3 m, cells of slanted sides included."""
     x0, z0, x1, z1 = polygon.bounds
     far = 3.0
     rects = [

@@ -33,11 +33,7 @@ class _Depths(NamedTuple):
 
 
 def way_under_m(chair: Shape, table: Shape, at: float, turns: int, most_m: float) -> float:
-    """Metres that a chair's front goes beyond a table's edge, at most most_m.
-
-    at: metres of the chair's middle from that of the edge, along the chair's width. turns: quarter turns
-    of the chair to the left, against the table's.
-    """
+    """Metres, at most most_m, that a chair's front goes beyond a table's edge; turns: quarters to the left."""
     return min(_way_m(chair, table, round(at / _CELL_M), turns % 4, most_m), most_m)
 
 
@@ -69,10 +65,7 @@ def _front(chair: Shape) -> _Depths:
 
 @lru_cache(maxsize=512)
 def _near(table: Shape, turns: int, most_m: float) -> _Depths:
-    """Where a table begins behind one of its edges, as a chair before that side sees it.
-
-    Only cells where it begins within most_m, and few others.
-    """
+    """Where a table begins behind an edge, seen by a chair there, mostly cells within most_m."""
     corners = corners_of_surfaces(table.surfaces)
     box = np.stack([corners.min((0, 1)), corners.max((0, 1))])
     # Take the points near the edge alone.

@@ -41,10 +41,7 @@ class WalkMap:
         self.joined_ways = [w for w in space.ways if region is not None and self._meets(region, w)]
 
     def with_bodies(self, free: Bools, rects: Iterable[Rect]) -> Bools:
-        """Free cell centres after placing furniture on rectangles.
-
-        free: (H, W) bool; a copy is returned. A person is a circle of radius _REACH_M.
-        """
+        """A copy of free cell centres (H, W) without those within _REACH_M of furniture on rectangles."""
         remaining = free.copy()
         for x0, z0, x1, z1 in rects:
             # Test the cells in the bounding rectangle; round its corners off.
@@ -60,11 +57,7 @@ class WalkMap:
         return remaining
 
     def reached(self, free: Bools, fronts: Iterable[Rect]) -> Bools | None:
-        """(H, W) middles of a man who came in by the doors; None where a door or front is cut off.
-
-        None is the answer that rejects an arrangement: some front, or one of the doors, cannot be
-        walked to.
-        """
+        """(H, W) cells reached from the doors; None if a door or front is cut off."""
         region = self._region(free, self._start)
         if region is None:
             return None

@@ -28,10 +28,7 @@ _SAME_SIDE_M: Final = 0.06
 
 
 def closed_rings(path: Path, lines: Sequence[Line], join_m: float = _JOIN_M) -> list[Polygon]:
-    """The rooms that walls close, ends within join_m joined, the largest first.
-
-    Raises BadInput with the place of the least gap where they close none.
-    """
+    """The rooms that walls close, the largest first, ends within join_m joined; BadInput names the least gap."""
     if len(lines) > MAX_LINES:
         raise BadInput(path, "walls", f"has {len(lines)} walls, at most {MAX_LINES} are read")
     walls = [line for line in lines if math.dist(*line) >= _SHORTEST_M]
@@ -63,10 +60,7 @@ def closed_rings(path: Path, lines: Sequence[Line], join_m: float = _JOIN_M) -> 
 def passages_between(
     rooms: Sequence[Polygon], lines: Sequence[Line], openings: Sequence[dict[str, Any]]
 ) -> list[dict[str, Any]]:
-    """Rows for passages: door-sized gaps between two rooms' walls without an opening in the file.
-
-    lines: centre lines of walls, metres. Without a passage, a wall would close the doorway.
-    """
+    """Rows of passages: door-sized gaps between two rooms' walls (centre lines) without an opening."""
     walls = [LineString(line) for line in lines if line[0] != line[1]]
     standing = unary_union([wall.buffer(_BESIDE_M, cap_style="flat") for wall in walls])
     opening_points = [Point(o["at"]) for o in openings]

@@ -82,10 +82,7 @@ class _Row:
 
 
 def plan_of_rows(path: Path, apartment: str = "") -> ParsedPlan:
-    """Read one apartment, one storey per floor.
-
-    Raises BadInput: not such a table, unknown apartment, or several if none is named.
-    """
+    """Read one apartment, one storey per floor; BadInput for another table, and to name an apartment."""
     floors = _floors(path)
     if not floors:
         raise BadInput(path, "", "has no row of the type area with an apartment_id")

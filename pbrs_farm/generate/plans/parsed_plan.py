@@ -66,11 +66,7 @@ class LeftOut:
     first: dict[str, str] = field(default_factory=dict)
 
     def add(self, what: str, place: str = "") -> None:
-        """Record an omission.
-
-        what: a sentence that holds for all of its kind; equal sentences become one line with a count.
-        place: where in the file, reported for the first.
-        """
+        """Record an omission at a place of the file; equal sentences become one line with a count."""
         self.counts[what] = self.counts.get(what, 0) + 1
         self.first.setdefault(what, place)
 
@@ -94,11 +90,7 @@ class Footprint(NamedTuple):
 
 
 def footprint(shape: Polygon) -> Footprint:
-    """The least rectangle around a shape, its width the longer side.
-
-    Gives its middle, sizes in metres, and the angle about +y at which its right side points along
-    the width; sizes of 0 for a shape without area.
-    """
+    """Middle, sizes (the longer first), angle about +y of the least rectangle around a shape; zeros without area."""
     corners = shapely.get_coordinates(shape.minimum_rotated_rectangle)
     if len(corners) < 4:
         x, z = shape.centroid.coords[0]
@@ -114,11 +106,7 @@ def footprint(shape: Polygon) -> Footprint:
 
 
 def footprints(shape: Polygon) -> list[Footprint]:
-    """The rectangles that make up a shape: one, or several of an L or a U.
-
-    At most four. A shape that fills its own rectangle nearly, or has very many corners, gives that
-    rectangle.
-    """
+    """The one to four rectangles of a shape, such as an L or a U; its own if nearly full or very complex."""
     whole = footprint(shape)
     ground = largest_part(shape.simplify(0.03)) or shape
     area = whole.width * whole.depth
@@ -159,10 +147,7 @@ def ring_of(shape: Polygon) -> list[list[float]]:
 def opening(
     shape: Footprint, kind: str, *, sill: float | None = None, height: float | None = None
 ) -> dict[str, Any]:
-    """The row of a door or window whose ground is given; its width is the longer side.
-
-    "at" is the middle, metres. A sill or height that is not given is left out of the row.
-    """
+    """The row of a door or window by its ground, the longer side its width; missing sill or height left out."""
     row: dict[str, Any] = {"at": [shape.x, shape.z], "width": shape.width, "kind": kind}
     if height is not None:
         row["height"] = height
@@ -177,11 +162,7 @@ def value_of(
     height: float,
     walls: Sequence[dict[str, Any]] = (),
 ) -> dict[str, Any]:
-    """A storey in the form of this project's plan JSON (plan_files.py).
-
-    rooms, walls: its rows. openings: rows of any kind, sorted here into doors and windows. height: from
-    floor to ceiling, clamped to 2 to 6 m; 2.6 m if it is not a number.
-    """
+    """A storey as this project's plan JSON; height clamped to 2 to 6 m, or 2.6 m if not a number."""
     rows = list(openings)
     glazed = ("window", "french_window")
     return {

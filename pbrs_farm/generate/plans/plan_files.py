@@ -60,10 +60,7 @@ class PlanFile:
 
 @cache
 def plan_formats() -> tuple[PlanFormat, ...]:
-    """The formats of plans, each at the end of its module beside this one, in their order.
-
-    A new format needs its module alone. Imports all of them.
-    """
+    """The formats of plans, each the entry of a module beside this one, all of which it imports."""
     names = [module.name for module in pkgutil.iter_modules(plans.__path__)]
     modules = [import_module(f"{plans.__name__}.{name}") for name in names]
     formats = [m.FORMAT for m in modules if isinstance(getattr(m, "FORMAT", None), PlanFormat)]
@@ -71,10 +68,7 @@ def plan_formats() -> tuple[PlanFormat, ...]:
 
 
 def plan_from_file(path: Path, part: Part | str = "", value: Any = None) -> PlanFile:
-    """Read the plan of a file, or of a part of it, rotated so that its longest walls are along x or z.
-
-    value: of the file as JSON, where another reader has made one. Raises BadInput, naming the room or opening. Invalid parts of machine-written files are left out.
-    """
+    """The plan of a file, its value (JSON) or a part, walls along x and z; BadInput names the place."""
     part = Part(apartment=part) if isinstance(part, str) else part
     suffix = path.suffix.lower()
     if part.apartment and suffix != ".csv":
@@ -170,10 +164,7 @@ def _choose_storeys(
 
 
 def upright(file: PlanFile) -> PlanFile:
-    """The storeys turned about their origin so that most walls of the home run along x or z.
-
-    One angle for all storeys, so that they stay upon each other; furniture turns with them.
-    """
+    """The storeys turned about their origin by one angle, so that most walls of the home run along x or z."""
     angle = upright_angle([room for storey in file.storeys for room in storey.plan.rooms])
     cos, sin = math.cos(angle), math.sin(angle)
 

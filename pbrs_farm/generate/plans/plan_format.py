@@ -28,10 +28,7 @@ class Part:
 
 
 def part_of(word: str) -> Part:
-    """The part that a word names, `apartment=ID`, `floor=K`, both with a comma. Raises BadInput.
-
-    "" is the whole file. Whether the file has such a part is its reader's question.
-    """
+    """The part that a word names: "" or `apartment=ID`, `floor=K`, both with a comma. Raises BadInput."""
     part = Part()
     for option in filter(None, word.split(",")):
         key, _, value = option.partition("=")

@@ -99,10 +99,7 @@ class _PlanFields(BaseModel):
 def plan_of_value(
     path: Path, value: Any, left_out: LeftOut | None = None, tops: Sequence[WallTop] = ()
 ) -> Plan:
-    """The plan of a value. left_out: of a machine's plan, collects what does not fit; None = a person's.
-
-    tops: upper edges of its walls where some are sloped. Raises BadInput, naming the room or opening.
-    """
+    """The plan of a value; faults go to left_out, without it (of a person's plan) they are BadInput."""
     plan = checked(_PlanFields, value, path, hint='{"rooms": [...], "doors": [...]}')
     # Build walls between the drawn rooms; openings are then assigned to walls.
     fields = [checked(_RoomFields, row, path, f"room {k}") for k, row in enumerate(plan.rooms, 1)]

@@ -57,11 +57,7 @@ def typed_rooms(
     left_out: LeftOut,
     railings: Sequence[Polygon] = (),
 ) -> list[dict[str, Any]]:
-    """Rows of the areas that are rooms, in input order.
-
-    Types follow from names, else furniture, railings, windows and doors, else size. Without any living
-    area, the largest plain room becomes one. Slivers and non-rooms are left out.
-    """
+    """Rows of the rooms, in order, typed by name, else furniture and openings, else size; slivers left out."""
     rooms: list[tuple[DrawnArea, str]] = []
     sure = [
         "balcony" if kind == BY_FIXTURES and _is_railed(area.shape, railings) else kind
@@ -110,10 +106,7 @@ def _by_word(source: str, area: DrawnArea) -> str:
 
 
 def type_by_words(name: str) -> str:
-    """The room type that the words of a name say, in any of the languages of room_words.csv.
-
-    A studio, an office in some languages and a home of one room in others, has a bed.
-    """
+    """The room type of a name's words, in the languages of room_words.csv; a studio has a bed."""
     kind, words = named_kind(name), words_of(name)
     if kind is None:
         return BY_FIXTURES

@@ -12,11 +12,7 @@ Size = tuple[float, float, float]  # width, height, depth
 
 
 def usual_size(name: str) -> Size | None:
-    """The size of the row of usual_sizes.csv that a name is, else of the last that it has a word of.
-
-    For plans that name furniture and give no size. Case, blanks and underscores do not matter. None
-    where no row fits.
-    """
+    """Size by the row of usual_sizes.csv that a name is, else the last with a word of it; or None."""
     table = _sizes_by_name()
     key = name.lower().replace("_", "").replace(" ", "")
     if key in table:

@@ -38,10 +38,7 @@ class WallTop(NamedTuple):
 
 
 def upper_edge(corners: Polygon) -> list[tuple[float, float]]:
-    """(x, y) of the upper edge of a wall's outline, x along the wall, from left to right.
-
-    A step up or down is two points at the same x.
-    """
+    """(x, y) of the upper edge of a wall's outline, x along the wall; a step is two points at one x."""
     ring = shapely.get_coordinates(corners.exterior)
     low, high = float(ring[:, 0].min()), float(ring[:, 0].max())
     points: list[tuple[float, float]] = []
@@ -73,10 +70,7 @@ def _height_at(ring: F64, x: float) -> float | None:
 
 
 def with_tops(walls: Sequence[PlanWall], tops: Sequence[WallTop]) -> tuple[PlanWall, ...]:
-    """The walls with the upper edges of their lines in the file; parapets are unchanged.
-
-    A wall without its own line takes the height of the nearest edge at each end.
-    """
+    """The walls, but for parapets, with the upper edges of their lines, else of the nearest at each end."""
     if not tops:
         return tuple(walls)
     lines = [LineString(top.places) for top in tops]

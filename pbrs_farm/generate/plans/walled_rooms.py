@@ -35,10 +35,7 @@ class DrawnRoom(NamedTuple):
 
 
 def walled(drawn: Sequence[DrawnRoom]) -> tuple[tuple[PlanWall, ...], tuple[PlanRoom, ...]]:
-    """Walls between and around rooms, and the rooms without the walls' ground, in input order.
-
-    A room completely covered by walls has no corners.
-    """
+    """Walls between and around rooms, and the rooms, in order, without the walls' ground."""
     shapes = [room.shape for room in drawn]
     rings = [_Ring(shape) for shape in shapes]
     near = shapely.STRtree(shapes)

@@ -168,7 +168,7 @@ def _surfaces_with_area(arch: Arch, surfaces: Sequence[Surface]) -> tuple[Surfac
 
 
 def slab_surfaces(arch: Arch, e: Element, materials: ModelMaterials) -> tuple[Surface, ...]:
-    """A floor or ceiling as a slab upwards from its points: top, bottom, side, as far as they have an area."""
+    """A floor or ceiling as a slab upwards from its points: those of top, bottom and side with an area."""
     material = _material(materials, e, 0)
     # Turn the outline counter-clockwise and its holes the other way.
     low = float(e.points[0][:, 1].min())

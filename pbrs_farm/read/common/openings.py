@@ -72,7 +72,7 @@ class _WallFrame:
 
 
 def openings(items: Sequence[Item]) -> tuple[Opening, ...]:
-    """An opening, not cut yet, for every door and window that is in one of the walls among the items."""
+    """An opening, not cut yet, for every door and window in one of the walls among the items."""
     frames = [f for item in items if item.kind is ItemKind.WALL for f in _frames(item)]
     results = []
     for item in items:

@@ -62,7 +62,7 @@ class SourceFiles:
         return self._digests[key]
 
     def digest(self, folder: RootFolder, names: Iterable[str]) -> str:
-        """Digest over names and bytes of the files below a folder that exist; "" if there are none."""
+        """Digest over names and bytes of the existing ones of these files below a folder; "" for none."""
         digests = {name: self._digest(folder, name) for name in names}
         lines = [f"{digest}  {name}\n" for name, digest in sorted(digests.items()) if digest]
         return hashlib.sha256("".join(lines).encode()).hexdigest() if lines else ""

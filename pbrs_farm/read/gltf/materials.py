@@ -345,7 +345,7 @@ class SceneMaterials:
             return None
 
     def with_vertex_colours(self, mesh: Mesh, material: Material) -> tuple[Mesh, Material]:
-        """The mesh and material with vertex colours: their mean, or a picture if there is none."""
+        """The mesh and material with vertex colours: their mean, or a picture without another one."""
         if mesh.colours is None:
             return mesh, material
         base = linear_from_srgb(np.array(material.diffuse))

@@ -108,7 +108,7 @@ def _with_file(note: Note, file: str) -> Note:
 
 
 def companions_digest(path: Path) -> str:
-    """Digest of the files beside a model that the reader opens, such as pictures; "" if there are none."""
+    """Digest of the files beside a model that the reader opens, such as pictures; "" for none."""
     files, folder = SourceFiles(), RootFolder(path.parent)
     if _is_plain(path):
         return files.digest(folder, _pictures_of_ply(path))

@@ -139,11 +139,7 @@ def _distance_to_lamp(point: F64, corners: F64) -> float:
 def icosphere(
     name: str, centre: F64, radius: float, material: int, *, n_splits: int = 2
 ) -> Surface:
-    """A closed sphere of 20 * 4^n_splits triangles whose corners lie on it, smooth normals.
-
-    centre: (3,) metres; material: index into the house's materials. Faces look outwards; there are
-    no uvs. Inscribed: its volume is a little less than the sphere's.
-    """
+    """A closed, inscribed sphere of 20 * 4^n_splits triangles, smooth normals, no uvs, about centre (3,)."""
     # Place the 12 vertices of an icosahedron by the golden ratio.
     g = (1 + 5**0.5) / 2
     points = [(s, t * g, 0.0) for s in (-1.0, 1.0) for t in (-1.0, 1.0)]

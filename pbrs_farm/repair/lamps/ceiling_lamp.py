@@ -1,8 +1,4 @@
-"""Position and shape of the lamp that repair adds to a room; no effects.
-
-Its shape is a piece of the group `ceiling_lamp` of the given catalogue. If there is no catalogue, or no
-piece of it fits below the ceiling, it is a small globe on a cord.
-"""
+"""Place and shape of an added lamp: a fitting `ceiling_lamp` of the catalogue, else a globe on a cord; no effects."""
 
 from __future__ import annotations
 
@@ -197,11 +193,7 @@ def place_of_lamp(house: House, room: Room) -> F64 | None:
 
 
 def heights_above(house: House, room: Room, places: F64) -> F64:
-    """(N,) y of the lowest structure above the room's floor at places (N, 2); inf = none.
-
-    places: world (x, z), metres. Structure of all storeys counts, furniture does not; looked at
-    from a little above the floor.
-    """
+    """(N,) world y of the lowest structure above the room's floor at places (N, 2); inf without any."""
     surfaces = [s for item in house.items if item.kind.is_structure for s in item.surfaces]
     triangles = corners_of_surfaces(surfaces)
     return lowest_above(places, triangles, room.floor_y + _ABOVE_FLOOR_M)

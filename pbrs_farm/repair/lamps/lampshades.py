@@ -1,7 +1,4 @@
-"""Lamps that keep their light in: what encloses the bulb becomes a translucent shade; no effects.
-
-A shade is never made invisible, and is never more than a part of the lamp itself.
-"""
+"""Parts of a lamp that enclose its bulb become a translucent, never an invisible, shade; no effects."""
 
 from __future__ import annotations
 
@@ -113,10 +110,7 @@ def _shade_of(material: int, materials: list[Material]) -> int:
 
 
 def _split_off(item: Item, j: int, is_shade: Bools, material: int) -> Item:
-    """The item with some faces of its surface j in the shade's material.
-
-    A split surface keeps its index and its shade is appended: LightPart.emitting stays valid.
-    """
+    """The item with some faces of surface j as an appended surface, so that LightPart.emitting stays valid."""
     surfaces = list(item.surfaces)
     s: Surface = surfaces[j]
     if is_shade.all():

@@ -54,11 +54,7 @@ class LightOutput:
 
 
 def lamp_scene_of_house(house: House, occluder_from: Callable[[House], Occluder]) -> LampScene:
-    """Lay out the house's lamps, without glass and bulbs, and build their ray caster.
-
-    Lamps are spaced in a grid, so that one caster measures all of them and none lights another;
-    structure near a lamp is included. The caster is None if there are no opaque faces.
-    """
+    """A caster over the lamps, far apart, with structure near them, without glass and bulbs; or None."""
     lamps = [k for k, item in enumerate(house.items) if item.lights]
     side = max(int(np.ceil(np.sqrt(len(lamps)))), 1)
     items: list[Item] = []
@@ -122,10 +118,7 @@ def _surface_of(corners: F64) -> Surface:
 def light_output_of_source(
     scene: LampScene, item: int, source: int, shades: Sequence[int], transmission: float
 ) -> LightOutput:
-    """Light output of one source from its own lamp, by N_RAYS rays that leave its bulb diffusely.
-
-    shades: indices of parts that let light through, each time weakened by transmission.
-    """
+    """Share of N_RAYS diffuse rays of a bulb that leave its lamp, each shade weakening by transmission."""
     rng = np.random.default_rng([item, source])
     origins, directions = _rays_of_source(scene, item, source, rng)
     # The last row of both is the structure, whose index is _STRUCTURE = -1.
@@ -181,11 +174,7 @@ def _rays_of_source(
 
 
 def diffuse_rays(surfaces: Sequence[Surface], n: int, rng: np.random.Generator) -> tuple[F64, F64]:
-    """n rays (origins, unit directions) that leave the surfaces' fronts as a diffuse emitter's.
-
-    surfaces: with some area; rng: its state is used up, so equal seeds give equal rays. float64 (n,
-    3) each. Origins lie a little off the face, so that a ray does not meet its own.
-    """
+    """n rays (origins a little off the face, unit directions), (n, 3) each, as of a diffuse emitter's fronts."""
     corners = corners_of_surfaces(surfaces)
     areas, normals = face_areas(corners), unit_normals(corners)
     # Choose faces by area, points uniformly on them.

@@ -120,10 +120,7 @@ def _with_added(house: House, added: Sequence[tuple[Item, Shape]]) -> House:
 def with_measured_lamps(
     house: House, n_added: int, fields: RepairFields, occluder_from: Callable[[House], Occluder]
 ) -> House:
-    """The house with the light output ratio of its last n_added items, which are lamps.
-
-    Their bulbs become brighter by what their shades keep in.
-    """
+    """The house with its last n_added lamps measured, and brighter by what their shades keep in."""
     if not n_added:
         return house
     kept, lamps = house.items[:-n_added], house.items[-n_added:]

@@ -45,10 +45,7 @@ class Space:
         return not self.reasons
 
     def explain(self, room_id: str) -> str:
-        """Why that room is open: its own reason, or the room it opens into.
-
-        "" when the space is closed.
-        """
+        """Why that room is open: its own reason, or the room it opens into; "" for a closed space."""
         reason_of_room = dict(self.reasons).get(room_id)
         if reason_of_room is not None or not self.reasons:
             return reason_of_room or ""
@@ -59,10 +56,7 @@ class Space:
 def spaces_of_rooms(
     real: Sequence[Room], wells: Sequence[Room], walls: Sequence[Wall], covers: Sequence[Cover]
 ) -> tuple[Space, ...]:
-    """Rooms that open into each other grouped, in the order of their first room.
-
-    wells: stairwells that no room covers; a space of wells alone is left out.
-    """
+    """Rooms that open into each other, and wells beside them, grouped in the order of their first room."""
     rooms = (*real, *wells)
     areas = [plan.polygon_of_room(r.polygon) for r in rooms]
     links: list[tuple[int, int]] = []  # rooms that open into each other, by index
@@ -137,11 +131,7 @@ def _open_sides_of_room(
 
 
 def edge_samples(area: plan.Shape) -> tuple[F64, F64]:
-    """Points (N, 2) along the edge of area, _STEP_M apart, and unit vectors (N, 2) out of it.
-
-    Holes have edges, too; their vectors point into the hole. Sides shorter than a step get one
-    point.
-    """
+    """Points (N, 2) along the edges of area, holes too, _STEP_M apart, and unit vectors out of it."""
     points, outward = [np.zeros((0, 2))], [np.zeros((0, 2))]
     for polygon in polygons_of(area):
         oriented = shapely.orient_polygons(polygon)
@@ -218,11 +208,7 @@ def _open_above_or_below(
 def bare_area(
     room: Room, rooms: Sequence[Room], covers: Sequence[Cover], *, above: bool
 ) -> plan.Shape:
-    """Plan area of a room with neither a cover nor another storey's room above (or below).
-
-    covers: floors and ceilings of the house. A part below a room of the next storey counts as
-    covered, since that room's floor closes it. Small gaps at that room's edge are ignored.
-    """
+    """Plan area of a room with neither cover nor a room of the next storey above (or below), small gaps aside."""
     bare = plan.without(plan.polygon_of_room(room.polygon), *_covers_of(room, covers, above=above))
     beyond = [rooms[j].polygon for j in _storey_next(room, rooms, above=above)]
     return plan.without(bare, *(plan.grown(plan.polygon_of_room(p), GAP_M) for p in beyond))

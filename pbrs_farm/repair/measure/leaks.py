@@ -33,10 +33,7 @@ class Occluder(Protocol):
     def first_hit(
         self, origins: F32, directions: F32, max_distance: float = ...
     ) -> tuple[F32, I32]:
-        """Distance (N,) in metres, inf = a miss, and face index (N,), -1 = a miss.
-
-        origins, directions: (N, 3) float32, directions unit.
-        """
+        """Distance (N,) in metres, inf = a miss, and face index (N,), -1 = a miss, of rays (N, 3)."""
         ...
 
 
@@ -59,11 +56,7 @@ def leaks_of_house(
     occluder_from: Callable[[House], Occluder],
     meter: LeakMeter | None = None,
 ) -> LeakReport:
-    """Count, for each closed space, the rays that reach the sky. The house is a repaired one.
-
-    interiors: by room id. plugs: fill its openings. Only structure and plugs stop rays: furniture
-    hides no leak.
-    """
+    """Rays of each closed space that reach the sky through structure and plugs of a repaired house."""
     meter = LeakMeter() if meter is None else meter
     # Trace rays against the structure alone, its openings filled.
     shell = plugged_shell(house, plugs)
@@ -90,11 +83,7 @@ def leaks_of_house(
 
 
 def plugged_shell(house: House, plugs: Sequence[Surface]) -> House:
-    """The house's structure alone, with its openings filled.
-
-    plugs: solids of the openings, from the cutting. The ground is excluded, so that it does not
-    replace a floor. For measurements, not for rendering.
-    """
+    """The structure of a house, without the ground, its openings filled with plugs; for measurements."""
     items = [i for i in house.items if i.kind.is_structure and i.kind is not ItemKind.GROUND]
     plug = Item("plugs", "plugs", ItemKind.WALL, house.levels[0].id, tuple(plugs))
     return replace(house, items=(*items, plug))

@@ -58,10 +58,7 @@ class _Cover(NamedTuple):
 
 
 def with_ceilings(house: House) -> House:
-    """Add a ceiling over the open area of every walled room without one.
-
-    New items have the tag ADDED_CEILING and the rooms has_ceiling, so a second call adds nothing.
-    """
+    """Add a ceiling, tagged ADDED_CEILING, over the open area of every walled room without one."""
     if all(room.has_ceiling for room in house.rooms):
         return house
     covers = [

@@ -47,20 +47,13 @@ class Patch:
 
 
 class TagTable:
-    """Maps original ids of manifold3d to tags; grows as solids are made.
-
-    One table per repair: solids of two tables cannot be combined, since ids are looked up in one.
-    """
+    """Maps manifold3d's original ids to tags; one per repair, as solids of two cannot be combined."""
 
     def __init__(self) -> None:
         self._tags: dict[int, Tag] = {}
 
     def reserve(self, tags: Sequence[Tag]) -> NDArray[np.uint32]:
-        """A new original id for each tag.
-
-        Ids are manifold3d's and of the whole process: they are never used twice, and differ from
-        run to run, so store none.
-        """
+        """A new original id, unique in the process and different from run to run, for each tag."""
         first = Manifold.reserve_ids(len(tags))
         for k, tag in enumerate(tags):
             self._tags[first + k] = tag
@@ -71,12 +64,7 @@ class TagTable:
 
 
 def solid_from_patches(patches: Sequence[Patch], table: TagTable) -> Manifold | None:
-    """The closed solid that patches bound, faces turned outward; None if they bound none.
-
-    Corners are welded where they are equal and, only if that closes nothing, where they are
-    within WELD_M. Open patches give None rather than a crash of manifold3d: only
-    closed meshes are handed to it.
-    """
+    """The closed solid, faces outward, that patches bound, welded up to WELD_M if needed; or None."""
     patches = [p for p in patches if len(p.faces)]
     if not patches:
         return None
@@ -116,11 +104,7 @@ def _manifold_of(patches: Sequence[Patch], table: TagTable, weld_m: float) -> Ma
 
 
 def faces_of_patches(patches: Sequence[Patch]) -> I64:
-    """(F, 3) faces of all patches, corners numbered through the concatenated vertices.
-
-    patches: at least one. The vertices are not welded: equal places of two patches have two
-    numbers.
-    """
+    """(F, 3) faces of all patches, corners numbered through the concatenated, unwelded vertices."""
     starts = np.cumsum([0, *(len(p.positions) for p in patches)])
     return np.concatenate([p.faces + s for p, s in zip(patches, starts[:-1], strict=True)])
 
@@ -153,19 +137,12 @@ def _welded(patches: Sequence[Patch], weld_m: float) -> _Welded:
 
 
 def unite(solids: Iterable[Manifold]) -> Manifold:
-    """The union of solids; faces inside it are gone, of coinciding faces one is left.
-
-    Ids of the input survive on the faces, by which `patches_from_solid` gives each back to its
-    item. No solid at all gives the empty one.
-    """
+    """The union of any solids; faces keep their ids, and of coinciding faces one is left."""
     return Manifold.batch_boolean(list(solids), manifold3d.OpType.Add)
 
 
 def subtract(solid: Manifold, cutters: Sequence[Manifold]) -> Manifold:
-    """Subtract all cutters from solid.
-
-    The faces of the hole carry the cutters' ids. Cutters may overlap.
-    """
+    """Subtract all cutters, which may overlap, from solid; faces of the hole carry the cutters' ids."""
     if not cutters:
         return solid
     return Manifold.batch_boolean([solid, *cutters], manifold3d.OpType.Subtract)
@@ -182,18 +159,12 @@ def bounds(solid: Manifold) -> F64:
 
 
 def overlap_of_bounds(a: F64, b: F64) -> F64:
-    """(3,) extents of the common box of two (2, 3) bounds; negative where they are apart.
-
-    All three above 0 means that the boxes overlap: a cheap test before a boolean.
-    """
+    """(3,) extents of the common box of two (2, 3) bounds, negative where they are apart."""
     return np.asarray(np.minimum(a[1], b[1]) - np.maximum(a[0], b[0]))
 
 
 def patches_from_solid(solid: Manifold, table: TagTable) -> list[Patch]:
-    """The solid's surface by tag, in order of item and surface; positions are float32 values.
-
-    Slivers are dropped. Each patch has separate vertices; uv are interpolated by the booleans.
-    """
+    """The solid's surface by tag in order, float32 values, separate vertices, interpolated uv, no slivers."""
     mesh = solid.to_mesh64()
     vertices = np.asarray(mesh.vert_properties, np.float64)
     # Pad a result without properties, as of an empty solid.

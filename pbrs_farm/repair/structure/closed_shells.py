@@ -40,11 +40,7 @@ ClosedShell = tuple[Manifold, list[Patch]]  # the solid, and the patches it was 
 
 
 def patch_from_surface(surface: Surface, item: int) -> Patch:
-    """The surface in double precision, tagged with its item; without uv, metric uv is added.
-
-    item: index of the item in the house. Missing normals are 0, which `surface_from_patch` drops
-    again.
-    """
+    """The surface in double precision, tagged with its item's index, with metric uv if it lacks uv."""
     positions = surface.positions.astype(np.float64)
     uvs = surface.uvs.astype(np.float64) if surface.uvs is not None else positions[:, [0, 2]]
     normals = (
@@ -57,11 +53,7 @@ def patch_from_surface(surface: Surface, item: int) -> Patch:
 
 
 def surface_from_patch(patch: Patch) -> Surface | None:
-    """The patch in single precision, faces of no area left out; None if nothing is left.
-
-    Faces keep their order; vertices that no face uses go. Single precision may make a thin face
-    flat: that is why area is asked for after rounding.
-    """
+    """The patch in single precision without faces that lose their area so; None if nothing is left."""
     positions = patch.positions.astype(np.float32)
     keep = faces_with_area(triangle_corners(positions, patch.faces), MIN_AREA_M2)
     if not keep.any():
@@ -92,10 +84,7 @@ class FlatPatch:
 
 
 def shells_from_item(item: Item, index: int, table: TagTable) -> list[ClosedShell] | None:
-    """The item as closed solids, one per connected shell; None if any part is not solid.
-
-    Open parts are not solid, nor is the inside of a room, which bounds no block.
-    """
+    """The item as closed solids, one per shell; None if a part is open or the inside of a room."""
     patches = [patch_from_surface(s, index) for s in item.surfaces if len(s.faces)]
     if not patches:
         return None
@@ -118,11 +107,7 @@ def _shows_a_room(patches: Sequence[Patch]) -> bool:
 
 
 def closed_shells(item: Item, table: TagTable) -> list[Manifold]:
-    """The closed solids among the connected parts of an item.
-
-    Closed means accepted by manifold3d: every edge has two faces with opposite direction. Sheets,
-    leaves and open boxes are skipped.
-    """
+    """The closed solids among the connected parts of an item, as manifold3d accepts them."""
     patches = [patch_from_surface(s, 0) for s in item.surfaces if len(s.faces)]
     if not patches:
         return []
@@ -134,11 +119,7 @@ def closed_shells(item: Item, table: TagTable) -> list[Manifold]:
 
 
 def components(patches: Sequence[Patch]) -> list[I64]:
-    """For each patch the shell (F,) of each face; shells are faces joined at their corners.
-
-    patches: at least one, with faces. Corners that round to one multiple of WELD_M are one place.
-    Numbers run over all patches together, with gaps, so two patches may share a shell.
-    """
+    """For each patch the shell (F,) of each face; faces of all patches are joined at corners within WELD_M."""
     positions = np.concatenate([p.positions for p in patches])
     # Number the places of corners through all patches.
     _, node = numbered_points(np.round(positions / WELD_M))
@@ -182,11 +163,7 @@ def _part(patch: Patch, faces: I64) -> Patch:
 
 
 def flat_patch(item: Item, index: int) -> FlatPatch | None:
-    """The item as one flat patch of its first surface's tag; None if it is not planar.
-
-    index: of the item in the house. A folded patch, or one with a front and a back, is not planar: its
-    normals cancel out.
-    """
+    """The item of that index as one patch of its first surface's tag; None unless planar and one-sided."""
     patches = [patch_from_surface(s, index) for s in item.surfaces if len(s.faces)]
     if not patches:
         return None

@@ -1,7 +1,4 @@
-"""Cut openings through both faces of their walls, and make the plugs that fill them.
-
-No effects.
-"""
+"""Cut openings through both faces of their walls, and make the plugs that fill them; no effects."""
 
 from __future__ import annotations
 
@@ -40,10 +37,7 @@ class WallPart:
 
 
 def thresholds(house: House, walls: Sequence[Wall]) -> plan.Shape:
-    """Plan area of the openings that reach down to the foot of their wall.
-
-    Doors, and windows down to the floor. Openings that begin higher do not count.
-    """
+    """Plan area of the openings (doors, some windows) that reach down to the foot of their wall."""
     areas = []
     for opening in house.openings:
         cutter = opening.cutter
@@ -58,11 +52,7 @@ def thresholds(house: House, walls: Sequence[Wall]) -> plan.Shape:
 def cut_openings(
     openings: Sequence[Opening], parts: Sequence[WallPart], table: TagTable
 ) -> tuple[list[Manifold], dict[str, tuple[Surface, ...]], list[str]]:
-    """Each part minus its openings; plugs by opening id; ids of openings that cut nothing.
-
-    A plug is as thick as its walls. If the source has cut the walls already, the opening's cutter is
-    its plug, and only joints are cut.
-    """
+    """Each part minus its openings; plugs as thick as the walls, by opening; ids that cut nothing."""
     cutters_of: list[list[Manifold]] = [[] for _ in parts]
     plugs: dict[str, tuple[Surface, ...]] = {}
     for opening in openings:

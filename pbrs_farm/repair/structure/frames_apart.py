@@ -39,11 +39,7 @@ class _Faces:
 
 
 def with_frames_apart(house: House) -> tuple[House, int]:
-    """Move corners of items out of coplanar walls; also returns the number of moved pieces.
-
-    An item is moved if a face of it overlaps a face of a wall, floor or ceiling with the same
-    direction, unless another face of either is within reach.
-    """
+    """Move faces out of coplanar structure unless another face is near; also the number of moved pieces."""
     walls = [i for i in house.items if i.kind in _FACED and i.n_faces]
     bounds = np.array([w.bounds for w in walls]).reshape(-1, 2, 3)
     items, n_moved = [], 0
@@ -59,11 +55,7 @@ def with_frames_apart(house: House) -> tuple[House, int]:
 
 
 def with_parts_apart(house: House) -> tuple[House, int]:
-    """Move parts of items out of coplanar faces of others; also returns the number of moved parts.
-
-    A part is the surface of one material. Of two overlapping coplanar faces with the same direction
-    the later is moved, unless another face is within reach.
-    """
+    """Move the later of overlapping coplanar parts (surfaces of a material); also their number."""
     moved = set[tuple[int, int]]()
     for _ in range(_ROUNDS):
         house, moved_now = _move_parts_once(house)
@@ -102,10 +94,7 @@ def _move_parts_once(house: House) -> tuple[House, set[tuple[int, int]]]:
 
 
 def _pairs_in_one_plane(corners: F64, of: NDArray[np.intp]) -> list[tuple[int, int, F64, float]]:
-    """(later part, earlier part, normal, offset) where two parts share area in a plane.
-
-    corners: (F, 3, 3) of all parts, of: (F,) the part of each, ascending. A part comes once a plane.
-    """
+    """(later part, earlier part, normal, offset) of parts `of` (F,) that share area in a plane."""
     vectors = area_vectors(corners)
     twice = np.linalg.norm(vectors, axis=1)
     faces = np.flatnonzero(twice > 2 * _LEAST_FACE_M2)

@@ -1,8 +1,4 @@
-"""Where walls meet walls, floors and ceilings: solids inside both, so that joints intersect.
-
-No effects. Joints keep _RECESS_M behind the walls' own faces: where the walls do touch nothing
-of a joint shows, where they do not it fills the gap.
-"""
+"""Solids inside two walls, or wall and floor or ceiling, _RECESS_M behind their faces, as joints; no effects."""
 
 from __future__ import annotations
 
@@ -30,11 +26,7 @@ _GAP_SEEN_M = 1e-4  # walls farther apart than this miss each other visibly
 def joints_between_walls(
     walls: Sequence[Wall], rooms: plan.Shape, table: TagTable
 ) -> tuple[list[tuple[Wall, Manifold]], int]:
-    """A solid across each place where two walls come within GAP_M, with the wall it belongs to.
-
-    Second: how many of them bridge a gap (the others lie inside walls that touch). rooms: plan
-    area of all rooms, into which no corner is filled.
-    """
+    """(wall, solid) for walls within GAP_M, outside rooms, and the number of those that bridge a gap."""
     parts: list[tuple[Wall, Manifold]] = []
     n_gaps = 0
     tree = shapely.STRtree([w.footprint for w in walls])

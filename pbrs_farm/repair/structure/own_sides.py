@@ -31,10 +31,7 @@ _OVERLAP_M2 = 1e-3  # outlines that share less lie side by side
 def with_own_sides_visible(
     walls: Sequence[Wall], rooms: Sequence[Room], table: TagTable
 ) -> list[Wall]:
-    """The walls with their rims cut by other rooms, with the remaining solid and footprint.
-
-    Walls without a room are unchanged.
-    """
+    """The walls, those with a room cut by other rooms, with the remaining solid and footprint."""
     areas = {r.id: plan.polygon_of_room(r.polygon) for r in rooms}
     visible = []
     for wall in walls:
@@ -87,11 +84,7 @@ def _rim(footprint: plan.Shape, reach: plan.Shape) -> plan.Shape:
 
 
 def along_and_across(footprint: plan.Shape) -> F64:
-    """(2, 2) rows: unit vectors in plan along the longest side of a footprint, and across it.
-
-    Of the smallest rectangle around it, so a bent wall has the direction of its whole. The second
-    row is the first turned by a quarter.
-    """
+    """(2, 2) unit vectors along and across the smallest rectangle around a footprint."""
     corners = shapely.get_coordinates(shapely.minimum_rotated_rectangle(footprint))
     sides = np.diff(corners[:3], axis=0)
     along = sides[int(np.linalg.norm(sides, axis=1).argmax())]

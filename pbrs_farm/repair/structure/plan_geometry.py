@@ -1,7 +1,4 @@
-"""Plan geometry: footprints, closing of narrow gaps, polygons of triangles; no effects.
-
-Plan points are (x, z) in metres, as Room.polygon.
-"""
+"""Plan geometry in metres, (x, z): footprints, closing of narrow gaps, polygons of triangles; no effects."""
 
 from __future__ import annotations
 
@@ -24,10 +21,7 @@ GRID_M = 1e-6
 
 
 def polygon_of_triangles(positions: F64, faces: NDArray[np.integer]) -> Shape:
-    """Plan area (one polygon, several or none) covered by triangles, seen from above.
-
-    positions: (V, 3) metres; faces: (F, 3). Both orientations count. Empty if all are vertical.
-    """
+    """Plan area covered by faces (F, 3) of either orientation, seen from above; may be empty."""
     # Drop vertical triangles, which have no plan area.
     corners = positions[:, [0, 2]][faces]
     u, v = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
@@ -36,18 +30,12 @@ def polygon_of_triangles(positions: F64, faces: NDArray[np.integer]) -> Shape:
 
 
 def polygon_of_room(outline: Points2) -> Shape:
-    """The room's outline as a valid plan polygon.
-
-    outline: (N, 2), three corners at least. An outline that crosses itself falls into its parts.
-    """
+    """The room's outline (N, 2) as a valid plan polygon, several if it crosses itself."""
     return on_grid(shapely.make_valid(shapely.Polygon(outline)))
 
 
 def on_grid(shape: Shape) -> Shape:
-    """shape with coordinates rounded to GRID_M, valid.
-
-    Degenerate lines and points are dropped. The result may be one polygon, several, or empty.
-    """
+    """shape with coordinates rounded to GRID_M, valid, without degenerate parts; may be empty."""
     return _areal(shapely.set_precision(shape, GRID_M))
 
 
@@ -60,44 +48,27 @@ def _areal(shape: Shape) -> Shape:
 
 
 def union(shapes: Iterable[Shape]) -> Shape:
-    """The plan area any of shapes covers; empty for none.
-
-    Shapes off the grid are rounded to it. Overlaps and shared edges are gone; parts that do not
-    touch stay apart (a MultiPolygon).
-    """
+    """The plan area any of shapes covers, on the grid; empty for none."""
     return _areal(shapely.union_all(list(shapes), grid_size=GRID_M))
 
 
 def grown(shape: Shape, by_m: float) -> Shape:
-    """shape with its edges moved outward (inward when negative), corners kept sharp.
-
-    Corners sharper than the mitre limit are cut off. Moving inward may leave nothing, or several
-    parts. The answer is not rounded to the grid: `union` or `common` does that.
-    """
+    """shape with its edges moved outward (inward when negative), corners kept sharp, not on the grid."""
     return shapely.buffer(shape, by_m, join_style="mitre", mitre_limit=3.0)
 
 
 def closed(shape: Shape, gap_m: float) -> Shape:
-    """shape with gaps narrower than gap_m filled; its other edges stay where they are.
-
-    Morphological closing, united with the shape, so that none of it is lost.
-    """
+    """shape with gaps narrower than gap_m filled; its other edges stay where they are."""
     return union([grown(grown(shape, gap_m / 2), -gap_m / 2), shape])
 
 
 def opened(shape: Shape, width_m: float) -> Shape:
-    """shape without parts narrower than width_m; its other edges stay where they are.
-
-    Morphological opening. Empty where all of it is narrow.
-    """
+    """shape without parts narrower than width_m; its other edges stay where they are."""
     return common(grown(grown(shape, -width_m / 2), width_m / 2), shape)
 
 
 def without(shape: Shape, *others: Shape) -> Shape:
-    """shape less all others.
-
-    Rounded to the grid; an empty shape among the others costs nothing.
-    """
+    """shape less all others, rounded to the grid."""
     for cutter in others:
         if not shapely.is_empty(cutter):
             shape = _areal(shapely.difference(shape, cutter, grid_size=GRID_M))
@@ -107,11 +78,7 @@ def without(shape: Shape, *others: Shape) -> Shape:
 def near_to(
     shape: Shape, things: Sequence[T], area: Callable[[T], Shape], within_m: float
 ) -> list[T]:
-    """The elements whose plan area is within within_m of shape, in order.
-
-    area: plan area of an element. Touching counts; distances are exact, not those of boxes. One pass
-    over all elements.
-    """
+    """The elements, in order, whose plan area is within within_m of shape."""
     areas = np.array([area(x) for x in things], object)
     if not len(areas):
         return []
@@ -120,8 +87,5 @@ def near_to(
 
 
 def common(a: Shape, b: Shape) -> Shape:
-    """The area both cover.
-
-    Edges and points that two shapes merely share are not in it: the answer is an area or empty.
-    """
+    """The area both cover, without mere edges and points; may be empty."""
     return _areal(shapely.intersection(a, b, grid_size=GRID_M))

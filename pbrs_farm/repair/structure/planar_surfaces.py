@@ -40,10 +40,7 @@ _UP = 0.05  # y of the normal of a face that is not upright, at least
 
 @dataclass(frozen=True, slots=True, eq=False)
 class PlanarSurface:
-    """The coplanar faces of a planar floor or ceiling, as an area and that plane.
-
-    Thickened to a slab by slabs.py. Solid floors and ceilings are never planar surfaces.
-    """
+    """The coplanar faces of a planar floor or ceiling, as an area and that plane, for slabs.py."""
 
     item: int  # index into House.items
     room_id: str | None
@@ -85,11 +82,7 @@ class FloorsAndCeilings:
 
 
 def floors_and_ceilings_from_house(house: House, table: TagTable) -> FloorsAndCeilings:
-    """Sort every floor, ceiling and ground item into planar, solid, or neither.
-
-    What is neither is named with the reason and stays as it was read. The ground outside is taken
-    only where it is solid.
-    """
+    """Floors, ceilings and solid ground: planar, solid, or neither, with the reason."""
     surfaces = FloorsAndCeilings([], {}, {}, [])
     for index, item in enumerate(house.items):
         if item.kind not in (ItemKind.FLOOR, ItemKind.CEILING, ItemKind.GROUND):
@@ -177,10 +170,7 @@ def _planar_surfaces(item: Item, index: int) -> Iterator[PlanarSurface]:
 
 
 def facets(positions: F64, faces: Faces) -> list[Faces]:
-    """The faces (F, 3) grouped by their plane, in order of first face; upright ones are left out.
-
-    positions: (V, 3) metres. Faces that look down count as those that look up.
-    """
+    """The faces (F, 3) grouped by their plane, in order of first face, up or down alike; upright ones left out."""
     normals = unit_normals(positions[faces])
     normals = normals * np.where(normals[:, 1:2] < 0, -1.0, 1.0)
     offsets = (normals * positions[faces[:, 0]]).sum(1)

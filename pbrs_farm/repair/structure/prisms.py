@@ -39,10 +39,7 @@ class Plane:
     c: float
 
     def at(self, plan: F64) -> F64:
-        """(N,) heights above plan points (N, 2).
-
-        In metres; the plane is infinite, so any point has a height.
-        """
+        """(N,) heights in metres above plan points (N, 2), anywhere on the infinite plane."""
         return np.asarray(self.a * plan[:, 0] + self.b * plan[:, 1] + self.c)
 
     def raised(self, by_m: float) -> Plane:
@@ -56,11 +53,7 @@ def level_plane(y: float) -> Plane:
 
 
 def plane_of_points(points: F64) -> Plane | None:
-    """The plane through points (N, 3), exactly horizontal if they are; None if not coplanar.
-
-    points: at least three, metres. Tolerance _ON_PLANE_M. A vertical plane has no height over the
-    plan: None.
-    """
+    """The plane through points (N >= 3, 3) within _ON_PLANE_M; None if not coplanar, or vertical."""
     # Answer exactly for a level surface: least squares would tilt it.
     low, high = float(points[:, 1].min()), float(points[:, 1].max())
     if high - low <= 1e-6:
@@ -73,11 +66,7 @@ def plane_of_points(points: F64) -> Plane | None:
 
 
 def affine_uv_map(positions: F64, uvs: F64) -> tuple[UvMap, float]:
-    """The affine map of x and z that fits uvs (N, 2) best, and the most it is off by.
-
-    positions: (N, 3), of which x and z count. The error is in units of uv: large where the texture
-    is laid on in another way, and the map is then not to be used.
-    """
+    """The affine map of x and z that fits uvs (N, 2) best, and its largest error, in uv."""
     affine = np.linalg.lstsq(_affine_columns(positions), uvs, rcond=None)[0]
 
     def uv(positions: F64) -> F64:
@@ -95,11 +84,7 @@ class UvPart:
 
 
 def uv_parts(positions: F64, faces: NDArray[np.integer], uvs: F64) -> tuple[UvPart, ...]:
-    """Parts of a flat surface with one affine texture mapping each; empty if there are too many.
-
-    positions: (V, 3) of which x and z are used, faces: (F, 3), uvs: (V, 2). A picture that ends or is
-    mirrored within a surface has another mapping in each part.
-    """
+    """Parts of a flat surface with one affine texture mapping each; empty if there are too many."""
     parts: list[UvPart] = []
     remaining = faces
     while len(remaining):
@@ -135,11 +120,7 @@ def _affine_columns(positions: F64) -> F64:
 
 
 def polygons_of(shape: plan.Shape, *, min_area_m2: float = 1e-6) -> list[shapely.Polygon]:
-    """The polygons in any shapely geometry, larger than min_area_m2, in a fixed order.
-
-    Lines and points that intersections leave are dropped. The order (by bounds, then area)
-    makes repair deterministic whatever order shapely gives.
-    """
+    """The polygons of a shape, larger than min_area_m2, by bounds and area, so that repair is deterministic."""
     polygons = [
         p
         for p in shapely.get_parts(shapely.get_parts(shape)).tolist()
@@ -155,10 +136,7 @@ def prism(
     tags: tuple[Tag, Tag, Tag],
     uv: UvMap | None = None,
 ) -> list[Patch]:
-    """Patches bottom, top and sides of the closed prism. tags: of bottom, top, sides.
-
-    uv: of bottom and top; metres in plan when None. Sides have metres along and up.
-    """
+    """Patches bottom, top and sides of the closed prism, with their tags; uv: of bottom and top, else metres."""
     # Triangulate the outline with its holes, corners shared by bottom, top and sides.
     polygon = shapely.orient_polygons(_with_rings_apart(polygon))
     rings = [np.asarray(r.coords)[:-1] for r in (polygon.exterior, *polygon.interiors)]
@@ -199,11 +177,7 @@ def solid_prisms(
     table: TagTable,
     uv: UvMap | None = None,
 ) -> list[Manifold]:
-    """The prisms over polygons between two planes as solids; those without volume are left out.
-
-    tags: of bottom, top and sides. uv: texture coordinates of top and bottom,
-    None = metres in plan.
-    """
+    """The prisms over polygons between two planes as solids, without empty ones; arguments as of prism."""
     solids = (solid_from_patches(prism(p, low, high, tags, uv), table) for p in polygons)
     return [s for s in solids if s is not None]
 

@@ -35,10 +35,7 @@ class RoomVolume:
 
 
 def volumes_of_rooms(rooms: Sequence[Room], surfaces: Sequence[PlanarSurface]) -> list[RoomVolume]:
-    """The volumes of every room, a part below each plane of its ceiling, a little too large.
-
-    What they cut ends inside walls, floor and ceiling, flush with none of them.
-    """
+    """Volumes of rooms, a part per ceiling plane, enlarged so that cuts end inside the structure."""
     margin = _margin(rooms)
     spans = _height_spans(surfaces)
     volumes = []
@@ -92,10 +89,7 @@ def _volume(area: shapely.Polygon, low: Plane, high: Plane, items: frozenset[int
 def without_volumes(
     solid: Manifold, tag: Tag, item: int | None, volumes: Sequence[RoomVolume], table: TagTable
 ) -> Manifold:
-    """solid less the volumes of rooms, save of the room that item (a floor or ceiling) bounds.
-
-    New faces get tag.
-    """
+    """solid less the volumes of rooms but that which item bounds; new faces get tag."""
     cutters = []
     for volume in _overlapping(bounds(solid), volumes):
         if item in volume.items:

@@ -86,10 +86,7 @@ def _wall_meets_surface(surface: PlanarSurface | Cover, wall: Wall) -> bool:
 def visible_areas(
     surfaces: Sequence[PlanarSurface], footprints: Sequence[plan.Shape]
 ) -> list[plan.Shape]:
-    """For each surface the part of its footprint it shows: where surfaces overlap, the later one.
-
-    Under walls, where two footprints meet, the earlier one. Surfaces at other heights do not count.
-    """
+    """For each surface the visible part of its footprint: of overlapping ones the later; under walls the earlier."""
     areas = []
     for i, surface in enumerate(surfaces):
         near = plan.near_to(surface.area, range(len(surfaces)), lambda j: surfaces[j].area, 1.0)
@@ -152,10 +149,7 @@ def _parts_by_uv(surface: PlanarSurface, area: plan.Shape) -> list[tuple[plan.Sh
 def bridge_gaps(
     surfaces: Sequence[PlanarSurface], thickness_m: float, table: TagTable
 ) -> list[Manifold]:
-    """Solids that join the planes of one ceiling behind its creases, where slabs only abut.
-
-    surfaces: of all items; only those of one item are joined. The solids stay behind visible faces.
-    """
+    """Solids behind the creases of an item's ceiling, where its slabs only abut."""
     solids = []
     for k, surface in enumerate(surfaces):
         other_areas = [s.area for j, s in enumerate(surfaces) if j != k and s.item == surface.item]

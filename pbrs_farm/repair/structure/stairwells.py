@@ -1,8 +1,4 @@
-"""Stairwells outside of rooms, and their missing floors or ceilings; no effects.
-
-People draw rooms around a stairwell. If stairs are between rooms and walls without a room of
-their own, the sky would be visible below or above them.
-"""
+"""Floors or ceilings for stairwells between rooms, which people draw without a room; no effects."""
 
 from __future__ import annotations
 
@@ -34,11 +30,7 @@ class Stairwells:
 def stairwells_of_house(
     house: House, walls: Sequence[Wall], surfaces: Sequence[PlanarSurface], covers: Sequence[Cover]
 ) -> Stairwells:
-    """Every hole among a level's rooms and walls in which stairs begin or end.
-
-    A missing floor or ceiling continues the nearest one of its level. A hole without stairs (a
-    courtyard, a shaft) is unchanged.
-    """
+    """Holes with stairs among a level's rooms and walls, their covers continued from the nearest."""
     wells = [
         Room(
             id=f"well_{level_id}_{k}",

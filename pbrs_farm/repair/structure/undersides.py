@@ -38,11 +38,7 @@ class _Stand(NamedTuple):
 
 
 def with_undersides(house: House) -> House:
-    """Split off the undersides of floors visible from below, as ceiling items.
-
-    A floor is visible from below if neither a ceiling nor another floor is between it and a room or
-    the ground outside. The new items are appended.
-    """
+    """Append, as ceilings, the undersides of floors that a room or the outdoors sees from below."""
     floors = [i for i in house.items if i.kind is ItemKind.FLOOR and i.n_faces]
     lowest = min((room.floor_y for room in house.rooms), default=np.inf)
     if not any(i.bounds[1, 1] > lowest + MIN_WALL_HEIGHT_M / 2 for i in floors):
@@ -84,10 +80,7 @@ def with_undersides(house: House) -> House:
 
 
 def _seen_from(item: Item, stands: Sequence[_Stand], above: F64) -> _Stand | None:
-    """A standpoint that sees most of a floor overhead; None if it is hidden.
-
-    above: triangles of all floors and ceilings, including its own.
-    """
+    """A standpoint that sees most of a floor past all others (above); None if it is hidden."""
     corners = corners_of_surfaces(item.surfaces)
     under = corners[unit_normals(corners)[:, 1] < MAX_UNDERSIDE_NORMAL_Y]
     if not len(under):

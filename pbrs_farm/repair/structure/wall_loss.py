@@ -62,11 +62,7 @@ def side_areas(
 
 
 def lost_walls(areas: Iterable[SideArea]) -> tuple[WallLoss, ...]:
-    """The walls that lost more than MAX_LOST_SHARE of their side.
-
-    areas: sides before and after repair, m2. Floors and ceilings are passed over, and so is a loss
-    of less than _LEAST_M2.
-    """
+    """The walls whose side lost more than MAX_LOST_SHARE and _LEAST_M2."""
     return tuple(
         WallLoss(item_id=a.item_id, before_m2=a.before_m2, after_m2=a.after_m2)
         for a in areas

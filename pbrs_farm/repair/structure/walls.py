@@ -48,10 +48,7 @@ BASEBOARD = "baseboard"
 
 
 def with_metric_uv(patch: Patch) -> Patch:
-    """The patch with uv in metres if repair added it; unchanged if it is from the source.
-
-    v is the height on vertical faces, world z on others; u is perpendicular to it in the face's plane.
-    """
+    """The patch with uv in metres if repair added it: v height or world z, u across it in the face's plane."""
     if patch.tag.surface not in ADDED_SURFACES:
         return patch
     # Span each face's plane by u across and v up (or along z if horizontal).
@@ -75,11 +72,7 @@ def with_metric_uv(patch: Patch) -> Patch:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Wall:
-    """A wall's solid before openings are cut, with its footprint and heights.
-
-    An item whose shells are several walls gives several. Joints and cuts take `item` and
-    `material` from here.
-    """
+    """A wall's solid before openings are cut, one per shell of its item, with its footprint and heights."""
 
     item: int  # index into House.items
     solid: Manifold
@@ -158,10 +151,7 @@ def _wall_of_solid(
 def _footprint_and_top(
     patches: Sequence[Patch], high_y: float
 ) -> tuple[plan.Shape, Plane, tuple[tuple[plan.Shape, Plane], ...]]:
-    """Plan area of the faces that look up, the plane of the wall's upper edge, and a gable's slopes.
-
-    A wall with holes looks up at its sills too: the level top counts if it covers half the plan.
-    """
+    """Plan area of upward faces, the top's plane (level if it covers half the plan), a gable's slopes."""
     footprint, level_top, points, upward = [], [], [], []
     for p in patches:
         faces = p.faces[unit_normals(p.positions[p.faces])[:, 1] > 0.05]
@@ -213,10 +203,7 @@ def _thickened(
 def _with_texture_in_parts(
     patch: Patch, normal: F64, thickness_m: float, table: TagTable
 ) -> Manifold | None:
-    """A solid from a flat patch with several texture mappings; None if there is only one.
-
-    A layer per part, in front of an overlapping base, as in slabs: no seam goes through.
-    """
+    """A solid from a flat patch with several texture mappings, a layer each before one base; or None."""
     local, _axes = _in_frame_of_wall(patch, normal)
     if affine_uv_map(local, patch.uvs)[1] <= MAX_UV_OFF:
         return None
@@ -232,10 +219,7 @@ def _with_texture_in_parts(
 
 
 def extrude(patch: Patch, normal: F64, thickness_m: float) -> list[Patch] | None:
-    """The flat patch as a solid: its own face, and an opposite one thickness_m behind it.
-
-    normal: (3,) unit, outward from the given face. uv continues by its affine map.
-    """
+    """The flat patch as a solid: its own face and one thickness_m behind it, against the unit normal."""
     local, _axes = _in_frame_of_wall(patch, normal)
     # Carry the texture on by the affine map that fits it.
     uv, _ = affine_uv_map(local, patch.uvs)

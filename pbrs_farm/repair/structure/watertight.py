@@ -38,10 +38,7 @@ from pbrs_farm.repair.structure.walls import Wall, walls_from_house, with_metric
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Structure:
-    """The repaired walls, floors and ceilings of a house.
-
-    plugs: closed solids of the wall's own thickness, for each opening that cuts a wall.
-    """
+    """The repaired walls, floors and ceilings of a house, and the plugs of its openings."""
 
     surfaces: dict[int, tuple[Surface, ...]]  # item index -> new surfaces, none if swallowed
     plugs: dict[str, tuple[Surface, ...]]  # opening id -> what fills it for the leak meter
@@ -176,10 +173,7 @@ def _surfaces_by_item(solid: Manifold, table: TagTable) -> dict[int, tuple[Surfa
 
 
 def with_structure(house: House, structure: Structure) -> tuple[House, list[Removed]]:
-    """The house with its new structure; items of which no face is left are taken out.
-
-    Materials, rooms and lights stay; item order stays. The second answer is for the report.
-    """
+    """The house with its new structure, in item order, and the items of which no face is left."""
     items: list[Item] = []
     removed = []
     for index, item in enumerate(house.items):

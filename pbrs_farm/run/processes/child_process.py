@@ -1,7 +1,4 @@
-"""The operating system's side of a render process: its start, pipes, log and end.
-
-Effects: a process in a new session, and its log file.
-"""
+"""The operating system's side of a render process: its start, session, pipes, log and end."""
 
 from __future__ import annotations
 
@@ -65,11 +62,7 @@ class ChildProcess:
             self._requests.flush()
 
     def receive(self, timeout_s: float) -> bytes | None:
-        """Its next line, None when none came in time or the pipe is closed.
-
-        Without its line end. A child that closed its pipe is waited for up to a second, so that
-        `exit_code` says how it ended. From one thread only.
-        """
+        """Its next line, or None by then or at its end, whose `exit_code` it awaits; from one thread only."""
         # Read on where no whole line is held yet.
         if b"\n" not in self._buffer:
             chunk = self._replies.read(timeout_s)

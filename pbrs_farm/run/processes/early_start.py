@@ -20,10 +20,7 @@ STARTED: Final[dict[str, tuple[ChildProcess, tempfile.TemporaryDirectory[str]]]]
 
 
 def start_early(target: str) -> None:
-    """Start a process of `target` (see task_loop.main) for the next child_of, while options are being read.
-
-    Call it once per target, and `end_untaken` at the end of the caller.
-    """
+    """Start a process of `target` for the next child_of, once per target; call `end_untaken` at the end."""
     folder = tempfile.TemporaryDirectory(prefix="pbrs-farm-")
     STARTED[target] = (ChildProcess(target, Path(folder.name) / "early.log"), folder)
 
@@ -37,10 +34,7 @@ def end_untaken() -> None:
 
 
 def child_of(target: str, log: Path) -> ChildProcess:
-    """The live process started early for a target, or a new one.
-
-    log: its log file from now on, in the file system of temporary files.
-    """
+    """The live process started early for a target, or a new one; log: its log file from now on."""
     if target not in STARTED:
         return ChildProcess(target, log)
     child, folder = STARTED.pop(target)

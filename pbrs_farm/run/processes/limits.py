@@ -1,7 +1,4 @@
-"""Limits of a render process, and the resources of the machine.
-
-Effects: reads /sys.
-"""
+"""Limits of a render process, and the resources of the machine. Reads /sys."""
 
 from __future__ import annotations
 
@@ -38,10 +35,7 @@ class ProcessLimits:
 
 
 def machine_mb(limits: tuple[Path, ...] = _CGROUP_LIMITS) -> float:
-    """Memory available to this container or machine, in MiB, including memory in use.
-
-    limits: files of cgroups, version 1 or 2; the least number in them counts.
-    """
+    """Memory of this container or machine, in MiB, used or not: the least in limits, files of cgroups."""
     # Take the container's limit where it is below what the machine has.
     total = memory_bytes()
     for path in limits:

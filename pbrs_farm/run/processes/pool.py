@@ -1,7 +1,4 @@
-"""The render processes of a local run: one task each at a time, restarted when they die.
-
-Effects: starts and kills processes, writes their logs to a temporary folder.
-"""
+"""The render processes of a local run: one task each, restarted when they die, logs in a temporary folder."""
 
 from __future__ import annotations
 
@@ -44,10 +41,7 @@ class _Worker:
 
 
 class Pool:
-    """Render processes that run tasks, so many a lane. A process that dies costs the step it was in.
-
-    lanes: how many processes RENDER has, and FINISH: with any there, RENDER renders light.
-    """
+    """So many render processes per lane (RENDER, FINISH); one that dies costs the step it was in."""
 
     def __init__(self, lanes: tuple[int, int], setting: Setting, limits: ProcessLimits) -> None:
         self._lanes = lanes
@@ -96,11 +90,7 @@ class Pool:
         return {w.task.house_id for w in self._workers if w.task is not None}
 
     def give(self, task: RenderTask, lane: int) -> None:
-        """Hand a task to an idle process of the lane (`idle_houses`).
-
-        Loading a house costs more than the views of a room: a process that holds it comes first, then one
-        without a house, then any.
-        """
+        """Hand a task to an idle process of the lane: one with its house, else without any, else any other."""
         idle = [w for w in self._of(lane) if w.task is None]
         idle.sort(key=lambda w: (w.held_house != task.house_id, w.held_house != ""))
         fits = bool(idle) and idle[0].held_house in (task.house_id, "")
@@ -120,10 +110,7 @@ class Pool:
         return self._workers[-1]
 
     def events(self) -> Iterator[Event]:
-        """Wait up to a second for the next events; none while no process has a task.
-
-        The messages of a process come in their order; a process that died is an event, not an error.
-        """
+        """Wait up to a second for the next events, in order per process; a death is an event, too."""
         busy = [w for w in self._workers if w.task is not None]
         if busy:
             wait_readable([w.process for w in busy], CHECK_EVERY_S)

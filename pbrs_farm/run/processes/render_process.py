@@ -36,10 +36,7 @@ class Ended:
 
 
 class RenderProcess:
-    """One render process at a time: a dead, worn or swollen one is replaced by the next.
-
-    start: makes the process. clock: seconds that only grow.
-    """
+    """One render process at a time, made by start; a dead, worn or swollen one is replaced by the next."""
 
     def __init__(
         self,
@@ -84,11 +81,7 @@ class RenderProcess:
         return child
 
     def begin(self, request: bytes, *, task_s: float = math.inf) -> None:
-        """Send a task of at most task_s seconds; starts the process if there is none.
-
-        One task at a time. The request waits in the pipe until the process has loaded its libraries; the log of
-        the last task is emptied.
-        """
+        """Send a task of at most task_s seconds, with an empty log; starts the process if needed."""
         assert not self._is_busy, "one task at a time"
         child = self.start()
         child.clear_log()

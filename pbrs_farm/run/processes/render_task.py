@@ -63,10 +63,7 @@ _SECRETS = ("secret_key", "session_token")
 
 
 def line_from_task(setting: Setting, task: RenderTask) -> bytes:
-    """A task and its setting as task_from_line reads them. It holds the store's secret keys.
-
-    For a pipe only: never write it to a log or a file.
-    """
+    """A line for task_from_line, with the store's secret keys: for a pipe only, no log, no file."""
     fields = {
         name: getattr(setting, name) for name in ("store_url", "n_threads", "debug", "runner")
     }

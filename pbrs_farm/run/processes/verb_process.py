@@ -1,7 +1,4 @@
-"""Run a verb in a child process, so that a library that dies costs one line.
-
-Effects: starts a process, reads its notes from a temporary file.
-"""
+"""Run a verb in a child process, so that a library that dies costs one line; reads its notes."""
 
 from __future__ import annotations
 
@@ -30,10 +27,7 @@ _TAIL_BYTES: Final = 65536  # of the notes, in which the last one is whole
 
 
 def run_watched(target: str, words: Sequence[str], say: Callable[[str], None]) -> int:
-    """The exit code of `module:function`, called with words in a child that shares our terminal.
-
-    Where the child is killed: 1, after one line through say with the file and the step it was at.
-    """
+    """The exit code of `module:function` in a child; if killed 1, after one line about the file and step."""
     # A file, because not every system passes descriptors on. The child unlinks it immediately.
     handle, notes = _new_file()
     command = [sys.executable, "-P", "-c", _BOOT, json.dumps(sys.path), notes, target]

@@ -50,10 +50,7 @@ def size_of_views(place: str) -> Size:
 
 
 def read_views(place: str, size: Size, *, mode: str = "", most: int = 0) -> PictureSet:
-    """At most so many views of an output root or of shards; mode "" = their best light.
-
-    Raises BadInput for a place with fewer than two readable views.
-    """
+    """At most so many views of a root or of shards; mode "" = their best light. BadInput for fewer than two."""
     frames = evenly_spaced(_frames(place), most)
     pictures, left_out = _readable_pictures(
         place, [partial(_facts_of_frame, frame, size, mode) for frame in frames]
@@ -102,10 +99,7 @@ def _fitted(
 
 
 def read_photographs(place: Path, size: Size, *, most: int = 0) -> PictureSet:
-    """At most so many photographs below a folder, with depth if it has pairs; or views of another root.
-
-    Raises BadInput for a folder with fewer than two readable pictures.
-    """
+    """At most so many photographs, with depth from pairs, or views of a root; BadInput for fewer than two."""
     if not place.is_dir():
         raise BadInput(place, "", "no such folder")
     if is_root(place):

@@ -133,10 +133,7 @@ def shared_of_halves(a: Grouped, draws: int = 100) -> float | None:
 
 
 def nearest_of(a: F64, b: F64, *, leave_out_self: bool = False) -> tuple[F64, I64]:
-    """(n,) distance of each row of a to the nearest row of b, and (n,) the index of that row.
-
-    leave_out_self: b is a, and a row is not its own neighbour.
-    """
+    """(n,) distance of each row of a to the nearest (other, if leave_out_self) row of b, and (n,) its index."""
     squares = (a**2).sum(1)[:, None] + (b**2).sum(1)[None] - 2 * a @ b.T
     if leave_out_self:
         np.fill_diagonal(squares, np.inf)

@@ -1,8 +1,4 @@
-"""The paper's comparison: one network trained on several sets, tested on the same views. Effects: files.
-
-Each set is trained with each seed and the same number of views and steps, so that rows differ in
-their pictures only.
-"""
+"""The paper's comparison: a network trained on several sets, equal but for the pictures. Effects: files."""
 
 from __future__ import annotations
 
@@ -59,10 +55,7 @@ class Comparison:
 def compare(
     comparison: Comparison, judged_on: Sequence[JudgedViews], tell: Tell = lambda _line: None
 ) -> dict[str, Any]:
-    """Train every set with every seed and test each run on all views; figures by set and seed.
-
-    With equal_views every set is reduced to the size of the smallest. tell gets a line per set.
-    """
+    """Train every set with every seed and test on all views; equal_views reduces sets to the smallest's size."""
     plan, rows = comparison.plan, {}
     loaded = [training_views(row.source, plan) for row in comparison.sets]
     if comparison.equal_views:
@@ -189,10 +182,7 @@ def hold_out_notes(sets: Sequence[TrainingSet]) -> list[str]:
 def training_sets(
     words: Sequence[str], modes: Sequence[str], source: TrainingSource
 ) -> tuple[TrainingSet, ...]:
-    """Rows of `[NAME=]ROOT[+ROOT][@MODE]`, one for each mode unless it has one.
-
-    source: common fields of all rows. Raises BadInput for two rows of one name.
-    """
+    """Rows of `[NAME=]ROOT[+ROOT][@MODE]`, one per mode without its own; BadInput for two of one name."""
     sets: dict[str, TrainingSet] = {}
     for word in words:
         label, equals, rest = word.partition("=")

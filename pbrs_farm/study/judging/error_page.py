@@ -29,10 +29,7 @@ N_SHOWN: Final = 8  # number of worst views on the page, and of best ones
 
 
 def write_evaluation(out: Path, run: Trained, evaluations: list[Evaluation]) -> Path:
-    """Write table.md, evaluation.json and index.html; the page's path.
-
-    Raises BadInput if the folder is not writable.
-    """
+    """Write table.md, evaluation.json and index.html; the page's path. BadInput if not writable."""
     rows, html = report(run, evaluations), error_page(run, evaluations)
     page = write_report(out, "evaluation.json", rows, html)
     (out / "table.md").write_text(evaluation_text(run, evaluations) + "\n", "utf-8")

@@ -175,10 +175,7 @@ def evaluate(run: Trained, views: JudgedViews) -> Evaluation:
 def with_others(
     run: Trained, evaluation: Evaluation, name: str, predictions: Iterable[NDArray[Any]]
 ) -> Evaluation:
-    """The evaluation with another column: predictions in the order and at the sizes of the truths.
-
-    BadInput for a name that the evaluation has already.
-    """
+    """The evaluation with a column of predictions in the order of the truths; BadInput for a repeated name."""
     if name in evaluation.rows:
         raise BadInput("--predictions", name, "a second column of this name", hint="NAME=DIR")
     return _with_row(run, evaluation, name, predictions)

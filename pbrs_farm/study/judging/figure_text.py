@@ -59,8 +59,5 @@ def markdown(head: Sequence[str], rows: Sequence[Sequence[str]]) -> str:
 
 
 def is_underfit(train_error: float, baseline_error: float) -> bool:
-    """True if the error on training views is near that of a baseline that sees no picture.
-
-    Report such a network as no result, not as a bad one.
-    """
+    """True if the error on training views is near a baseline's without pictures: no result, not a bad one."""
     return train_error > UNDERFIT * baseline_error

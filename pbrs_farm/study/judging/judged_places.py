@@ -157,10 +157,7 @@ def _photographs(
 def _nyu_views(
     path: Path, plan: TrainingPlan, name: str, trained_on: frozenset[str]
 ) -> JudgedViews:
-    """The test pictures of the .mat, or all pictures without splits.mat.
-
-    Raises BadInput if a training picture is among them.
-    """
+    """The test pictures of the .mat, or all without splits.mat; BadInput for a training picture among them."""
     split = "test" if has_splits(path) else "all"
     if split == "all" and NYU_HOME in trained_on:
         text = "the run was tuned on NYUv2, and without splits.mat what trained would judge"

@@ -55,11 +55,7 @@ def shipped_run(task: str) -> Path:
 
 
 def pack_weights(root: Path, out: Path, *, made_by: Sequence[str] = ()) -> RunFolder:
-    """Write a finished run's weights as half floats into out, with their record and a card.
-
-    The card has the results in RUN/evaluation, and made_by, the command lines of the training.
-    Raises BadInput for any other folder.
-    """
+    """Write a finished run as half floats, record and card (with results and made_by); BadInput for others."""
     run, packed = open_run(root), RunFolder(make_folder(out))
     tensors, position = read_tensors(run.folder.weights)
     halves = {name: x.half() if x.is_floating_point() else x for name, x in tensors.items()}

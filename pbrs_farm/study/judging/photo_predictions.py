@@ -1,8 +1,4 @@
-"""Predictions of a finished run for photographs: files and a page. Effects: reads photographs, writes files.
-
-Photographs keep their proportions: they are resized to about as many pixels as in training, and the
-output is enlarged to the size of the photograph.
-"""
+"""Predictions of a run for photographs, resized to the training's number of pixels. Effects: files, a page."""
 
 from __future__ import annotations
 
@@ -68,10 +64,7 @@ def photograph_files(words: Sequence[Path]) -> list[Path]:
 
 
 def read_photograph(path: Path, name: str = "") -> Photograph:
-    """Read a picture and turn it by its EXIF orientation; name "" = the file's stem.
-
-    Raises BadInput for a damaged file and for too many pixels.
-    """
+    """Read a picture and turn it by its EXIF orientation (name "" = its stem); BadInput for damage."""
     data = read_given(path)
     colour = decode_photo(data, str(path))
     if colour.shape[0] * colour.shape[1] > _MAX_PIXELS:
@@ -129,10 +122,7 @@ def camera_of_photograph(
 
 
 def network_size(height: int, width: int, n_pixels: int) -> tuple[int, int]:
-    """(height, width) for the network: about the photograph's proportions and n_pixels.
-
-    Rounded to a multiple that all stages divide, and at least one multiple across.
-    """
+    """(height, width), multiples that all stages divide, of about these proportions and n_pixels."""
     scale = (n_pixels / (height * width)) ** 0.5
     rows, columns = (max(round(n * scale / _MULTIPLE), 1) * _MULTIPLE for n in (height, width))
     # The deepest stage needs two cells.

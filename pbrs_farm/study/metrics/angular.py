@@ -17,10 +17,7 @@ _N_BINS: Final = round(180 / _BIN_DEG) + 1
 
 
 def angles_deg(predicted: NDArray[Any], truth: NDArray[Any]) -> F64:
-    """(...) degrees 0..180 between the vectors of two arrays (..., 3) of any length.
-
-    The angle with a zero vector is 90 degrees. Raises ValueError for NaN.
-    """
+    """(...) degrees 0..180 between vectors (..., 3) of any length, 90 with a zero vector; ValueError for NaN."""
     a, b = np.asarray(predicted, np.float64), np.asarray(truth, np.float64)
     if not (np.isfinite(a).all() and np.isfinite(b).all()):
         raise ValueError("a normal is not finite")
@@ -54,11 +51,7 @@ class AngularErrors:
         self._sum_of_squares = 0.0
 
     def add(self, predicted: NDArray[Any], truth: NDArray[Any], valid: Mask) -> float:
-        """Add the valid pixels of a view; its mean error in degrees, NaN without any.
-
-        predicted and truth are (H, W, 3) unit vectors in one frame, valid (H, W) bool. Views with
-        more valid pixels have more weight.
-        """
+        """Add the valid pixels (H, W) of unit vectors (H, W, 3); the view's mean error in degrees, or NaN."""
         errors = angles_deg(predicted[valid], truth[valid])
         self._histogram += np.bincount(
             np.rint(errors / _BIN_DEG).astype(np.intp), minlength=_N_BINS

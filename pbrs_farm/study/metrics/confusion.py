@@ -29,10 +29,7 @@ class Confusion:
         self.counts = np.zeros((n_classes, n_classes), np.int64)
 
     def add(self, predicted: NDArray[Any], truth: NDArray[Any]) -> float:
-        """Count the labelled pixels of a view; its pixel accuracy, NaN without any.
-
-        Raises ValueError for a label or a prediction outside 1..n_classes.
-        """
+        """Count a view's labelled pixels; its pixel accuracy, or NaN. ValueError for classes out of range."""
         n = len(self.counts)
         labelled = truth > 0
         rows, columns = (
@@ -52,11 +49,7 @@ class Confusion:
         return _shares(hits, self.counts.sum(0) + self.counts.sum(1) - hits)
 
     def score(self) -> ClassScore:
-        """Figures over all pixels so far; NaN without a pixel.
-
-        The mean accuracy is over classes in the truth, the mean IoU over classes in truth or
-        prediction.
-        """
+        """Figures over all pixels so far, NaN without any; the mean IoU is over classes in truth or prediction."""
         n = int(self.counts.sum())
         if n == 0:
             return ClassScore()

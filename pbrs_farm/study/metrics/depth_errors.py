@@ -38,9 +38,8 @@ class DepthErrors:
         self._relative = self._squares = 0.0
 
     def add(self, predicted: NDArray[Any], truth: NDArray[Any], valid: Mask) -> float:
-        """Add the valid pixels (H, W), metres, of a view; its scale-invariant error, NaN without any.
-
-        The standard deviation of ln(predicted / true) is the same at every scale of the prediction.
+        """Add the valid pixels (H, W), metres; the view's standard deviation of ln(predicted
+        true), or NaN.
         """
         p, t = (np.asarray(depth[valid], np.float64) for depth in (predicted, truth))
         if not p.size:
@@ -54,10 +53,7 @@ class DepthErrors:
         return self._spreads[-1]
 
     def score(self) -> DepthScore:
-        """Figures so far; NaN without a pixel.
-
-        The scale-invariant error is a mean over views, the other figures are over pixels.
-        """
+        """Figures over pixels so far, the scale-invariant one a mean over views; NaN without a pixel."""
         if not self._n:
             return DepthScore()
         return DepthScore(

@@ -20,11 +20,7 @@ _AROUND: Final = ((0, 1), (-1, 1), (-1, 0), (-1, -1), (0, -1), (1, -1), (1, 0), 
 
 
 def suppress_non_maxima(strength: NDArray[Any], dim_border_px: int = _DIM_BORDER_PX) -> F32:
-    """(H, W) float32: strength (H, W) at its maxima across the edges, else 0.
-
-    The direction across is that of the largest curvature of the smoothed map, an eigenvector of its
-    Hessian; the neighbours at a distance of one pixel are interpolated.
-    """
+    """(H, W) float32 strength at its maxima across the largest curvature of the smoothed map, else 0."""
     strength = np.asarray(strength, np.float64)
     along_row, along_column = _across(strength)
     # Compare each pixel with both neighbours across its edge.
@@ -64,11 +60,7 @@ def _fading(shape: tuple[int, ...], border_px: int) -> F64:
 
 
 def thin_edges(edges: Mask) -> Mask:
-    """(H, W) bool: lines one pixel wide with the length and the connections of the edges.
-
-    Two alternating passes remove pixels from opposite sides (Guo and Hall 1989; Lam, Lee and Suen
-    1992, page 879).
-    """
+    """(H, W) bool lines, one pixel wide, of the same length (Guo and Hall 1989; Lam, Lee and Suen 1992)."""
     width = edges.shape[1] + 2
     flat = np.pad(edges, 1).ravel()
     around = np.array([r * width + c for r, c in _AROUND])

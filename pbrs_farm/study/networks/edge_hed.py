@@ -1,7 +1,4 @@
-"""The paper's network for boundaries: holistically-nested edge detection (Xie and Tu 2015).
-
-VGG-16 with edge scores after each stage, upsampled to the picture, and their fusion.
-"""
+"""The paper's network for boundaries: holistically-nested edge detection on VGG-16 (Xie and Tu 2015)."""
 
 from __future__ import annotations
 

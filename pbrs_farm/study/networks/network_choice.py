@@ -38,11 +38,7 @@ _LITE: Final = (127 / 255, 128 / 255)  # mean and scale of EfficientNet-Lite, ab
 
 
 def network_of(name: str, n_out: int, *, rays: bool = False) -> nn.Module:
-    """The network by name with n_out output channels and random weights from torch's generator.
-
-    rays: three more input channels for the ray of each pixel (pixel_rays.py). Seed torch first for
-    reproducible weights. Raises BadInput for an unknown name.
-    """
+    """The network by name with random weights (seed torch first); rays: three more inputs. BadInput."""
     if name not in _NETWORKS:
         raise BadInput("network", name, "no such network", hint=f"of {', '.join(_NETWORKS)}")
     return _NETWORKS[name](n_out, 6 if rays else 3)

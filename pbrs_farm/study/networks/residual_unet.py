@@ -47,10 +47,7 @@ class ResidualUnet(nn.Module):  # type: ignore[misc]
 
 
 def attended(x: Tensor, place: nn.Linear, blocks: nn.ModuleList) -> Tensor:
-    """Features (B, C, H, W) after attention between all cells.
-
-    place: layer from rows and columns to C channels. blocks: `Attention` of C channels.
-    """
+    """Features (B, C, H, W) after attention between all cells; place: layer from rows and columns to C channels."""
     cells = x.flatten(2).mT + place(rows_and_columns(x).flatten(2).mT)
     for block in blocks:
         cells = block(cells)

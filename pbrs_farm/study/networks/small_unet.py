@@ -44,11 +44,7 @@ class SmallUnet(nn.Module):  # type: ignore[misc]
 
 
 def encode(stages: nn.ModuleList, x: Tensor) -> tuple[Tensor, list[Tensor]]:
-    """Bottleneck features of x (B, C, H, W), and the skip connections from fine to coarse.
-
-    Each stage gets its input averaged over 2x2 pixels (rounded up at an odd edge); the skip
-    connection is the input itself.
-    """
+    """Bottleneck features of x (B, C, H, W), halved at each stage, and the stages' inputs as skip connections."""
     skips: list[Tensor] = []
     for stage in stages:
         skips.append(x)
@@ -57,10 +53,7 @@ def encode(stages: nn.ModuleList, x: Tensor) -> tuple[Tensor, list[Tensor]]:
 
 
 def decode(stages: nn.ModuleList, x: Tensor, skips: list[Tensor]) -> Tensor:
-    """Features at full size from the bottleneck features and skip connections of `encode`.
-
-    Each stage gets the coarser features, upsampled bilinearly, beside its skip connection.
-    """
+    """Features at full size: each stage gets the coarser ones, upsampled, beside its skip connection."""
     for stage, skip in zip(stages, reversed(skips), strict=True):
         size = skip.shape[-2:]
         x = functional.interpolate(x, size, mode="bilinear", align_corners=False)

@@ -56,10 +56,7 @@ class ShardedViews(IterableDataset):  # type: ignore[misc]
         return sum(shard.n_views for shard in self.chosen)
 
     def start_at(self, epoch: int, n_batches: int = 0, batch_size: int = 1) -> None:
-        """Start in an epoch after some of its batches.
-
-        n_batches: counted with a DataLoader of batch_size and the present number of workers.
-        """
+        """Start in an epoch after n_batches of a DataLoader with batch_size and the same workers."""
         self.epoch, self.n_skipped, self.batch_size = epoch, n_batches, batch_size
 
     def samples(self) -> Iterator[Sample]:

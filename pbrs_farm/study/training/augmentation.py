@@ -15,10 +15,7 @@ from pbrs_farm.study.training_plan import TrainingPlan
 
 
 def augment(batch: Batch, task: StudyTask, plan: TrainingPlan, dice: torch.Generator) -> Batch:
-    """Augment a batch with colour (B, 3, H, W) float 0..1 by random numbers of dice (on the CPU).
-
-    rays (B, H, W, 2), if in the batch, follow the pixels (pixel_rays.py).
-    """
+    """Augment a batch, colour (B, 3, H, W) 0..1 and rays (B, H, W, 2) if any, by random numbers of dice."""
     n, device = len(batch["colour"]), batch["colour"].device
 
     def drawn(*shape: int) -> Tensor:
@@ -67,10 +64,7 @@ def _relit(colour: Tensor, plan: TrainingPlan, drawn: Callable[..., Tensor]) -> 
 
 
 def _enlarge(batch: Batch, shares: Tensor, shifts: Tensor) -> Batch:
-    """A crop of each view at full size: shares (B,) of its width, shifts (B, 2) -1..1 within it.
-
-    Directions are unchanged, as with a longer lens.
-    """
+    """A crop of each view at full size, as by a longer lens: shares (B,) of its width, shifts (B, 2) -1..1."""
     n, _, height, width = batch["colour"].shape
     theta = torch.zeros((n, 2, 3), device=shares.device)
     theta[:, 0, 0] = theta[:, 1, 1] = shares
@@ -115,10 +109,7 @@ def _rotations(angles: Tensor) -> Tensor:
 
 
 def _sample_at(batch: Batch, grid: Tensor) -> Batch:
-    """Resample the batch at grid (B, H, W, 2), -1..1 from edge to edge.
-
-    Colour is interpolated, labels take the nearest pixel, or 0 outside.
-    """
+    """Resample at grid (B, H, W, 2), -1..1 between edges: colour interpolated, labels nearest, or 0 outside."""
     n, _, height, width = batch["colour"].shape
     colour = functional.grid_sample(
         batch["colour"], grid, mode="bilinear", padding_mode="border", align_corners=False

@@ -1,7 +1,4 @@
-"""State of a training in one safetensors file: weights, optimiser, generator, position. Effects: files.
-
-A new file replaces the older one in one step, so that a killed process leaves a complete file.
-"""
+"""State of a training in one safetensors file, which a new one replaces in one step. Effects: files."""
 
 from __future__ import annotations
 
@@ -81,10 +78,7 @@ def load_checkpoint(
     optimiser: torch.optim.Optimizer | None = None,
     average: nn.Module | None = None,
 ) -> Position:
-    """Load the state into the network and, if given, the optimiser with torch's generator and the mean.
-
-    Raises BadInput if the file is damaged or of another network.
-    """
+    """Load network, optimiser with generator, and mean, if given; BadInput for damage or other networks."""
     tensors, position = read_tensors(path)
     _into(network, _below(tensors, "model."), path)
     if average is not None:
@@ -101,10 +95,7 @@ def load_checkpoint(
 
 
 def read_tensors(path: Path) -> tuple[dict[str, Tensor], Position]:
-    """Tensors of a checkpoint, on the CPU, and its position; BadInput for any other file.
-
-    Nothing is executed: safetensors has no code.
-    """
+    """Tensors of a checkpoint, on the CPU, and its position; BadInput for any other file."""
     try:
         tensors, metadata = read_tensor_file(path)
         return tensors, Position(**json.loads(metadata["position"]))

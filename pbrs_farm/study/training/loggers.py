@@ -1,7 +1,4 @@
-"""Metrics of a training in TensorBoard or Weights & Biases. Effects: theirs.
-
-Each row of metrics.jsonl adds a point to the curve of each value, at the row's step.
-"""
+"""Metrics of a training, each row a point of each curve, in TensorBoard or Weights & Biases. Effects: theirs."""
 
 from __future__ import annotations
 

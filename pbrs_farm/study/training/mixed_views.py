@@ -1,8 +1,4 @@
-"""Views with a share of each batch from photographs.
-
-The views and photographs of a step depend on the step and the seed only, so that a killed run
-resumes to the same weights.
-"""
+"""Views with a share of each batch from photographs, by step and seed only, so that a run can resume."""
 
 from __future__ import annotations
 
@@ -20,10 +16,7 @@ from pbrs_farm.study.training_plan import TrainingPlan
 
 @dataclass(frozen=True, slots=True, eq=False)
 class MixedViews(TrainingViews):
-    """Views, and sets of photographs, each with its share of a batch.
-
-    All but `digest` and `batches` is that of the views alone.
-    """
+    """Views with sets of photographs, each with its share of a batch; the rest is as of the views alone."""
 
     views: TrainingViews
     photographs: tuple[tuple[ViewArrays, float], ...]

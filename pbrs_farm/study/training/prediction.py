@@ -96,10 +96,7 @@ def _enlarged(x: torch.Tensor, size: tuple[int, int]) -> torch.Tensor:
 def network_output(
     network: nn.Module, colour: torch.Tensor, plan: TrainingPlan, rays: torch.Tensor | None = None
 ) -> torch.Tensor:
-    """Output of the network for colour (B, 3, H, W) 0..1 at that size; plan.enlarge applies.
-
-    rays: (B, H, W, 2) of each pixel, in plans with `rays`.
-    """
+    """Output for colour (B, 3, H, W) 0..1 and, in plans with `rays`, rays (B, H, W, 2); plan.enlarge applies."""
     height, width = colour.shape[-2:]
     colour = encode_colour(colour, plan.encoding)
     if rays is not None:

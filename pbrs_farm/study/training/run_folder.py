@@ -80,10 +80,7 @@ class RunFolder:
         return (self.root / "run.json").exists() and self.record()["state"] == FINISHED
 
     def begin(self, row: dict[str, Any]) -> bool:
-        """Write the record of a new or resumed run; False if it is finished already.
-
-        Raises BadInput if the folder has a run of another task, plan, seed, mode or views.
-        """
+        """Write the record of a run; False if finished already, BadInput if it is another run's folder."""
         if (self.root / "run.json").exists():
             older = self.record()
             was, now = (_identity(r, str(self.root / "run.json")) for r in (older, row))

@@ -34,11 +34,7 @@ Picture = tuple[Frame, SampleRequest]  # a view in one light
 
 @dataclass(frozen=True, slots=True, eq=False)
 class StreamedViews(TrainingViews):
-    """Training views by reference; plan.workers processes read ahead of the steps.
-
-    The order of views in shards needs few shards at a time, so that shards can be in S3; it is the
-    same for every number of workers and processes.
-    """
+    """Training views by reference, read ahead by plan.workers in the same order, few shards at a time."""
 
     pictures: tuple[Picture, ...]
     plan: TrainingPlan

@@ -13,10 +13,7 @@ Points = Sequence[tuple[float, float]]  # (step, value)
 
 
 def curves_svg(panels: Mapping[str, Mapping[str, Points]]) -> str:
-    """A picture of panels one below the other: title -> named curves over steps, values from 0.
-
-    Curves without a point are left out.
-    """
+    """Panels one below the other, title -> named curves over steps from 0, without empty curves."""
     height = _HEIGHT * len(panels)
     svg = svg_file(
         viewBox=f"0 0 {_WIDTH} {height}",

@@ -54,11 +54,7 @@ def train(
     observe: Observer = lambda _row: None,
     also: Judge = lambda _network: {},
 ) -> dict[str, Any]:
-    """Train and write weights, figures and curves; the figures. A finished run is not trained again.
-
-    also: further errors by name, evaluated each plan.judge_every steps. Errors of the loop are raised
-    and written to the record.
-    """
+    """Train and write weights, figures and curves; the figures, unless finished. also: more errors by name."""
     folder, plan = RunFolder(job.out), job.plan
     device_of(plan)
     share = share_of_process()
@@ -109,10 +105,7 @@ def _faster(
     plan: TrainingPlan,
     share: Share,
 ) -> tuple[TrainingPlan, dict[str, Any]]:
-    """The plan with bfloat16 only if that is faster here, and the measured times.
-
-    A resumed run keeps its arithmetic. GPUs and several processes follow the plan.
-    """
+    """The plan with bfloat16 only if faster here, and times; a resumed run, a GPU and several processes keep it."""
     if not plan.bf16 or share.of > 1 or device_of(plan).type != "cpu":
         return plan, {}
     if (folder.root / "run.json").exists():

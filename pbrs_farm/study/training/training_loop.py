@@ -1,8 +1,4 @@
-"""The training loop: batches, loss, optimiser, checkpoints. Effects: the run's folder.
-
-All random numbers depend on the seed and the step, so that a killed run resumes to the same weights.
-Under torchrun each process takes its share of every batch (DDP).
-"""
+"""The training loop, resumable, as random numbers depend on seed and step; DDP under torchrun. Effects: files."""
 
 from __future__ import annotations
 

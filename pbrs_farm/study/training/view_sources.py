@@ -80,10 +80,7 @@ class TrainingSource:
 
 
 def training_views(source: TrainingSource, plan: TrainingPlan) -> TrainingViews:
-    """Training views in memory, or streamed if they exceed plan.memory_gb; mixed with source.mix.
-
-    Raises BadInput without any.
-    """
+    """Training views in memory, or streamed beyond plan.memory_gb, mixed with source.mix; BadInput."""
     views = _rendered_or_real(source, plan)
     if not source.mix:
         return views
@@ -122,10 +119,7 @@ def _rendered_or_real(source: TrainingSource, plan: TrainingPlan) -> TrainingVie
 
 
 def held_out_views(source: TrainingSource, plan: TrainingPlan, most: int = 0) -> ViewArrays | None:
-    """At most so many views of the held-out homes within plan.memory_gb; of NYUv2 the test pictures.
-
-    None without held-out views.
-    """
+    """At most so many held-out views (of NYUv2 the test pictures) within plan.memory_gb; or None."""
     if source.is_nyu:
         return _nyu_views(source, plan, "test", most)
     if source.is_photographs:
