@@ -48,7 +48,7 @@ from pbrs_farm.generate.floor_plan import (
     Storey,
 )
 from pbrs_farm.generate.model_file import material_name, obj_file, side_files
-from pbrs_farm.generate.opening_models import OpeningDesign, drawn_design, opening_model
+from pbrs_farm.generate.opening_models import OpeningDesign, door_form, drawn_design, opening_model
 from pbrs_farm.generate.plan_families import FLAT, PlanFamily, plan_families
 from pbrs_farm.generate.staircase import SLAB_M, Stair, staircase
 from pbrs_farm.images import png_from_array
@@ -328,13 +328,18 @@ def _add_opening(
     home: ET.Element, plan: Plan, opening: PlanOpening, contents: HomeContents, paints: Paints
 ) -> ET.Element:
     wall = plan.walls[opening.wall]
-    shape = opening_model(opening, wall.thickness, paints.design)
+    rooms = [plan.rooms[k].type for k in (opening.room, opening.other) if k is not None]
+    shape = opening_model(opening, wall.thickness, paints.design, rooms)
     low, high = shape.bounds
-    x, z = wall.at(opening.along)
     angle = _angle_into(plan, opening, wall)
+    # The handles protrude more in front, so the box is off the middle of its frame and wall.
+    x, z = wall.at(opening.along)
+    ahead = float(low[2] + high[2]) / 2
+    x, z = x - ahead * math.sin(angle), z + ahead * math.cos(angle)
     # A door turned about has its hinges on the wall's other end.
     key = (
         f"{opening.kind} {opening.width} {opening.height} {wall.thickness} {opening.hinge_at_start}"
+        f" {door_form(paints.design, rooms)}"
     )
     element = ET.SubElement(
         home,

@@ -6,6 +6,7 @@ import copy
 import json
 from collections.abc import Callable, Iterable
 from dataclasses import replace
+from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -25,8 +26,17 @@ from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import Box, House, Item
 from pbrs_farm.formats.house_bundle import bundle_from_house
 from pbrs_farm.furnishings.things.families import family_pieces, family_shape
-from pbrs_farm.generate.floor_plan import OpeningKind, PlanOpening
-from pbrs_farm.generate.opening_models import OpeningDesign, opening_model
+from pbrs_farm.generate.floor_plan import OpeningKind, PlanOpening, RoomType
+from pbrs_farm.generate.opening_models import (
+    CASINGS,
+    HANDLES,
+    LEAVES,
+    LIGHTS,
+    MOULDINGS,
+    SASHES,
+    OpeningDesign,
+    opening_model,
+)
 from pbrs_farm.geometry.opened import item_at
 from pbrs_farm.home.masses import weighed
 from pbrs_farm.read.builtin.builtin_home import builtin_home
@@ -39,17 +49,21 @@ Row = dict[str, Any]
 Plant = Callable[[Row, Row], object]
 
 
-def house_of(pieces: Iterable[Piece]) -> House:
-    """Pieces that open beside the built-in home, the first part of each left open."""
+def house_of(
+    pieces: Iterable[Piece], designs: Iterable[OpeningDesign] = (OpeningDesign(),)
+) -> House:
+    """Pieces, doors and windows that open beside the built-in home, the first part of each left open."""
     home = builtin_home()
     materials, items = list(home.materials), list(home.items)
     shapes = [(piece.id, piece.name, piece.nyu40, family_shape(piece)) for piece in pieces]
-    for kind, nyu40, width, height, sill in (
+    kinds = (
         (OpeningKind.DOOR, classes.DOOR, 0.9, 2.05, 0.0),
         (OpeningKind.WINDOW, classes.WINDOW, 1.4, 1.2, 0.9),
-    ):
+    )
+    for design, (kind, nyu40, width, height, sill) in product(designs, kinds):
         opening = PlanOpening(kind, 0, 1.0, width, height, sill, room=0)
-        shape = opening_model(opening, 0.1, OpeningDesign())
+        rooms = (RoomType.LIVING if design.lights else RoomType.BATHROOM,)
+        shape = opening_model(opening, 0.1, design, rooms)
         shapes.append((f"pbrs_farm#{kind}", str(kind), nyu40, shape))
     for k, (source_class, name, nyu40, shape) in enumerate(shapes):
         pose = np.eye(4)
@@ -223,6 +237,21 @@ def test_the_origin_of_a_model_with_one_instance_is_listed_as_not_looked_at(stor
     check_models(HouseCase(house, stored.glb, times, tally))
     (line,) = tally.certificate("", 1, 0, all_pixels=False).not_looked_at
     assert line == "positions of a model's origin, of models with one instance in their home (1)"
+
+
+def test_true_doors_and_windows_of_any_design_are_clean(tmp_path: Path) -> None:
+    n = max(len(LEAVES), len(SASHES))
+    designs = [
+        OpeningDesign(
+            leaf=LEAVES[k % len(LEAVES)], sash=SASHES[k % len(SASHES)], handle=HANDLES[k % len(HANDLES)],
+            lights=("", *LIGHTS)[k % 5], moulding=MOULDINGS[k % 3], casing=CASINGS[k % 4],
+            n_hinges=2 + k % 2, has_beads=k % 2 == 0, has_fixed_sash=k % 3 == 0,
+        )
+        for k in range(n)
+    ]  # fmt: skip
+    stored = Stored(house_of((), designs), tmp_path)
+    assert len(stored.rows) >= 2 * n
+    assert [stored.faults(row) for row in stored.rows] == [()] * len(stored.rows)
 
 
 @pytest.mark.long

@@ -90,6 +90,17 @@ def test_every_door_and_window_cuts_a_hole(seed: int) -> None:
     )
 
 
+def test_frames_of_doors_show_on_both_sides_of_their_walls() -> None:
+    openings, home = plan(1).openings, read(written(1))
+    built = [item for item in home.items if item.source_class.startswith("pbrs_farm#")]
+    for opening, item in zip(openings, built, strict=True):
+        wall = plan(1).walls[opening.wall]
+        frame = next(s for s in item.surfaces if not s.part).positions[:, [0, 2]]
+        away = (frame - np.array(wall.at(opening.along))) @ np.array(wall.normal)
+        assert away.min() == pytest.approx(-away.max(), abs=0.001)
+        assert away.max() > wall.thickness / 2 + 0.005
+
+
 @pytest.mark.quick(1)
 @pytest.mark.parametrize("seed", range(2))
 def test_repair_finds_closed_rooms_and_no_leak(seed: int) -> None:

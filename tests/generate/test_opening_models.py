@@ -7,19 +7,28 @@ import pytest
 import shapely
 
 from pbrs_farm.core.mesh import triangle_corners
-from pbrs_farm.generate.floor_plan import OpeningKind, PlanOpening
-from pbrs_farm.generate.opening_models import LEAVES, SASHES, OpeningDesign, opening_model
+from pbrs_farm.generate.floor_plan import OpeningKind, PlanOpening, RoomType
+from pbrs_farm.generate.opening_models import (
+    HANDLES,
+    LEAVES,
+    LIGHTS,
+    SASHES,
+    OpeningDesign,
+    opening_model,
+)
 
 WIDTH, HEIGHT = 0.9, 2.1
 
 
-@pytest.mark.parametrize("leaf", LEAVES)
+@pytest.mark.parametrize("leaf", [*LEAVES, *LIGHTS])
 @pytest.mark.parametrize(
     ("kind", "gap_m"), [(OpeningKind.ENTRANCE, 0.0), (OpeningKind.DOOR, 0.006)]
 )
 def test_no_light_comes_round_a_shut_leaf(leaf: str, kind: OpeningKind, gap_m: float) -> None:
     door = PlanOpening(kind, 0, 1.0, WIDTH, HEIGHT, 0.0, 0)
-    shape = opening_model(door, 0.26, OpeningDesign(leaf=leaf, entrance=leaf))
+    lights = leaf if leaf in LIGHTS else ""
+    design = OpeningDesign(leaf=leaf, entrance=leaf, lights=lights)
+    shape = opening_model(door, 0.26, design, (RoomType.LIVING,))
     corners = np.concatenate([triangle_corners(s.positions, s.faces) for s in shape.surfaces])
     # Along the wall's normal: inner doors have a gap above the floor, others none.
     covered = shapely.union_all(shapely.polygons(corners[:, :, :2].astype(np.float64)))
@@ -47,3 +56,16 @@ def test_some_french_windows_have_a_panel_of_wood_below() -> None:
         shape = opening_model(door, 0.26, OpeningDesign(sash=sash))
         lowest[sash] = min(s.positions[:, 1].min() for s in shape.surfaces if s.name == "pane")
     assert lowest["grid"] > 0.4 > lowest["plain"]
+
+
+def test_doors_of_a_home_differ_by_their_rooms_and_handles() -> None:
+    door = PlanOpening(OpeningKind.DOOR, 0, 1.0, WIDTH, HEIGHT, 0.0, 0)
+    built = {
+        (handle, room): np.concatenate([s.positions for s in shape.surfaces]).tobytes()
+        for handle in HANDLES
+        for room in (RoomType.BEDROOM, RoomType.BATHROOM, RoomType.LIVING)
+        for shape in [
+            opening_model(door, 0.1, OpeningDesign(handle=handle, lights="half"), (room,))
+        ]
+    }
+    assert len(set(built.values())) == len(built)
