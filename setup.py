@@ -1,9 +1,8 @@
 """Builds sdist and wheel: equal trees give equal bytes, and each says what an installation needs.
 
 The folder `workers` is installed as `pbrs_farm_workers`, and its imports with it; a checkout keeps the
-folder's own name (an editable install maps nothing). The text for an index is README.md without the
-parts that need a clone. Both archives have one date: SOURCE_DATE_EPOCH, else 1980. All other settings
-are in pyproject.toml.
+folder's own name (an editable install maps nothing). Both archives have one date: SOURCE_DATE_EPOCH,
+else 1980. All other settings are in pyproject.toml.
 """
 
 from __future__ import annotations
@@ -34,23 +33,6 @@ def renamed(source: str, modules: list[str]) -> str:
     source = re.sub(rf"(?<![\w./\"'-]){FOLDER}\.(?=(?:{names})\b)", f"{INSTALLED}.", source)
     source = re.sub(rf"(?<=[\"']){FOLDER}\.(?=(?:{names})\b)", f"{INSTALLED}.", source)
     return re.sub(rf"\bfrom {FOLDER} import\b", f"from {INSTALLED} import", source)
-
-
-def index_text(readme: str) -> str:
-    """README.md for an index of packages: no pictures, and no links into the repository.
-
-    A paragraph or table with a picture goes, with the caption after it; a link of another page
-    becomes its words. Addresses (https://) stay.
-    """
-    kept: list[str] = []
-    after_picture = False
-    for block in re.split(r"\n{2,}", readme.strip()):
-        has_picture = re.search(r"!\[[^\]]*\]\((?!https?://)", block) is not None
-        is_caption = after_picture and block.startswith("*") and block.endswith("*")
-        after_picture = has_picture
-        if not has_picture and not is_caption:
-            kept.append(re.sub(r"\[([^\]]*)\]\((?!https?://)[^)]*\)", r"\1", block))
-    return "\n\n".join(kept) + "\n"
 
 
 class BuildPy(build_py):
@@ -123,6 +105,4 @@ if __name__ == "__main__":
         packages=packages,
         package_dir=package_dir,
         cmdclass={"bdist_wheel": Wheel, "build_py": BuildPy, "sdist": SameBytes},
-        long_description=index_text((HERE / "README.md").read_text(encoding="utf-8")),
-        long_description_content_type="text/markdown",
     )

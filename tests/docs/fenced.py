@@ -26,7 +26,7 @@ DEPLOY_PAGES: Final = sorted(
     if "pbrs_farm_weights" not in p.parts
 )
 PAGES: Final = (
-    REPO / "README.md", REPO / "CONTRIBUTING.md", REPO / "ARCHITECTURE.md", *sorted((REPO / "docs").rglob("*.md")),
+    REPO / "README.md", REPO / "README.pypi.md", REPO / "CONTRIBUTING.md", REPO / "ARCHITECTURE.md", *sorted((REPO / "docs").rglob("*.md")),
     *DEPLOY_PAGES, *sorted((REPO / "examples").rglob("*.md")),
 )  # fmt: skip
 HOW: Final = ("run", "small", "excerpt")

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import importlib.util
 import os
+import re
 import subprocess
 import sys
 import tarfile
@@ -28,16 +29,16 @@ def build_script() -> ModuleType:
     return module
 
 
-def test_the_text_for_an_index_has_no_picture_and_no_link_of_a_clone(
-    build_script: ModuleType,
-) -> None:
-    text = build_script.index_text((REPO / "README.md").read_text(encoding="utf-8"))
-    assert text.startswith("# pbrs_farm\n")
+def test_the_text_for_an_index_needs_nothing_beside_it() -> None:
+    text = (REPO / "README.pypi.md").read_text(encoding="utf-8")
     assert "![" not in text
-    assert "](docs/" not in text
-    assert "pbrs-farm run Studio" in text
-    sample = "# A\n\n![x](p.jpg)\n*Whose.*\n\n| ![x](a.png) |\n|---|\n\n*Of whom.*\n\n*Kept.*\n\nSee [b](c.md), [d](https://e.f)."
-    assert build_script.index_text(sample) == "# A\n\n*Kept.*\n\nSee b, [d](https://e.f).\n"
+    assert "pip install" in text
+    targets = re.findall(r"\]\(([^)]*)\)", text)
+    assert targets
+    assert [target for target in targets if not target.startswith("https://")] == []
+    pages = set(re.findall(r"pbrs-farm help ([\w/]+)", text))
+    assert len(pages) > 5
+    assert [page for page in pages if not (REPO / f"docs/{page}.md").is_file()] == []
 
 
 def test_the_queues_code_is_called_by_its_installed_name(build_script: ModuleType) -> None:

@@ -102,7 +102,7 @@ def test_the_packagers_wheel_is_built_installed_and_runs(tmp_path: Path) -> None
     source = tmp_path / "source"
     for name in ("pbrs_farm", "workers"):
         shutil.copytree(REPO / name, source / name, ignore=shutil.ignore_patterns("__pycache__"))
-    for name in ("pyproject.toml", "setup.py", "README.md", "LICENSE", "NOTICE"):
+    for name in ("pyproject.toml", "setup.py", "README.pypi.md", "LICENSE", "NOTICE"):
         shutil.copy(REPO / name, source)
     build, install, *_rest = [w for w in lines_of("tutorials/packager.md") if w[0] == "pip"]
     # Without a network: with the installed setuptools, and no dependency.
