@@ -61,6 +61,7 @@ READ_BACK: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     "released": ("export", ("released",)),
     "tapvid": ("tapvid", ()),
     "tum": ("sequences", ("tum",)),
+    "wai": ("trainer_forms", ("wai", "covisibility")),
     "webdataset": ("export", ("webdataset",)),
     "yolo": ("export", ("yolo_boxes", "data_yaml")),
     "yolo-depth": ("training_forms", ("yolo_reads", "yolos_depth")),

@@ -18,14 +18,15 @@ from pbrs_farm.check.rules import judge
 from pbrs_farm.check.stored_files import stored_bytes, stored_object
 from pbrs_farm.check.stored_set import MODES
 from pbrs_farm.core.classes import NYU40_NAMES
-from pbrs_farm.images import array_from_png
+from pbrs_farm.images import array_from_png, layers_from_exr
 
 _FAR = 65535  # mm, and more
 _FAR_IS_NOTHING = ("yolo-depth", "marigold")
 _STRUCTURE = ("wall", "floor", "ceiling", "door", "window", "otherstructure")
 _BESIDE = {
     "coco": ("form masks",), "yolo": ("form boxes",), "yolo-seg": ("form boxes",), "yolo-semantic": ("form masks",),
-    "yolo-depth": ("form depth",), "marigold": ("form depth", "form normals"), "nerfstudio": ("form depth",),
+    "yolo-depth": ("form depth",), "marigold": ("form depth", "form normals"), "wai": ("form depth",),
+    "nerfstudio": ("form depth", "form normals"),
 }  # fmt: skip
 """Form -> checks of the files that every picture has beside it."""
 _DOCUMENTS = {"coco": ("annotations.json", "panoptic.json"), "questions": ("instances.json",)}
@@ -86,14 +87,18 @@ def check_depth(case: FormCase) -> None:
         wanted = truth.label("depth.png")
         if case.form.to in _FAR_IS_NOTHING:
             wanted = np.where(wanted < _FAR, wanted, 0)
-        if file.endswith(".npy"):  # of depth_z
-            wanted = truth.view.exr("depth_z.exr")["Z"] if truth.size is None else wanted
+        if file.endswith((".npy", ".exr")) and truth.size is None and truth.view.has("depth_z.exr"):
+            wanted = truth.view.exr("depth_z.exr")["Z"]
+        elif file.endswith(".exr"):
+            wanted = np.where(wanted < _FAR, wanted / 1000, 0)
         case.compare("form depth", case.place(file), _array(case, file), wanted, 1e-6)
 
 
 def _array(case: FormCase, file: str) -> NDArray[Any]:
-    """The array of a PNG or an .npy of the form."""
+    """The array of a PNG, an .npy or an EXR's channel of the form."""
     data = stored_bytes(case.folder / file)
+    if file.endswith(".exr"):
+        return layers_from_exr(data, case.place(file))["Y"]
     if file.endswith(".npy"):
         return np.asarray(np.load(io.BytesIO(data), allow_pickle=False))
     return array_from_png(data, case.place(file))
@@ -103,8 +108,11 @@ def check_normals(case: FormCase) -> None:
     """Normals as stored, or as unit vectors in OpenGL's axes, 0 for nothing."""
     for file, truth in _views_of(case, "form normals"):
         name = "valid" if file.endswith("_valid.png") else "normal"
-        wanted = truth.array(name) if file.endswith(".png") else truth.opengl_normals()
-        case.compare("form normals", case.place(file), _array(case, file), wanted, 1e-4)
+        stored = _array(case, file)
+        wanted = truth.array(name) if case.form.to == "released" else truth.opengl_normals()
+        if case.form.to == "nerfstudio":
+            stored = np.where((stored > 0).any(-1, keepdims=True), stored * (2 / 65535) - 1, 0)
+        case.compare("form normals", case.place(file), stored, wanted, 1e-4)
 
 
 def check_segments(case: FormCase) -> None:
@@ -319,9 +327,10 @@ def check_frames(case: FormCase) -> None:
             lens = _LENSES[facts.get("lens", {}).get("model", "pinhole")]
             judge("form frame", place, case.tally, row=row, facts=facts, pose=pose)
             judge("form frames", place, case.tally, document=document, lens=lens, turn=_Z_UP[:3].tolist(), override="none")  # fmt: skip
-            depth = Path(str(row.get("depth_file_path", row["file_path"]))).name
-            fits = depth == Path(row["file_path"]).name
-            case.tally.expect("form depth", place, fits, f"has the depth {depth}")
+            for what, name in (("depth", "depth"), ("normals", "normal")):
+                beside = Path(str(row.get(f"{name}_file_path", row["file_path"]))).name
+                fits = beside == Path(row["file_path"]).name
+                case.tally.expect(f"form {what}", place, fits, f"has the {what} {beside}")
     if case.form.to == "nerfstudio":
         _expect_views(case, shown)
 

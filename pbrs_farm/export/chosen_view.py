@@ -277,6 +277,13 @@ def opengl_normals(view: ChosenView, layer: str = "normal") -> NDArray[np.float3
     return np.where((view.array("valid") > 0)[..., None], unit, 0).astype(np.float32)
 
 
+def opengl_normals_png(view: ChosenView) -> NDArray[np.uint16]:
+    """(H, W, 3) uint16 of `opengl_normals`: round((n + 1) 65535 / 2), 0 for nothing."""
+    normals = opengl_normals(view)
+    has_one = np.asarray(normals != 0).any(-1, keepdims=True)
+    return np.where(has_one, np.rint((normals + 1) / 2 * 65535), 0).astype(np.uint16)
+
+
 def camera_facts(facts: dict[str, Any]) -> dict[str, Any]:
     """A view's camera in an export: K, its lens unless it is a pin-hole, its pose."""
     names = ("K", "lens", "depth", "world_from_camera_opencv")

@@ -1,4 +1,4 @@
-"""Albedo, shading and residual of a view for other tools. Effects: reads the view."""
+"""Linear light, albedo, shading and residual of a view for other tools. Effects: reads the view."""
 
 from __future__ import annotations
 
@@ -7,7 +7,31 @@ import numpy as np
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.lighting import GROUPS_OF_MODE, Group, Mode
+from pbrs_farm.core.resampling import resized_by_area
 from pbrs_farm.export.chosen_view import ChosenView
+from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
+from pbrs_farm.formats.radiance_exr import radiance_from_exr
+from pbrs_farm.regular_files import MAX_SCENE_BYTES, read_regular
+from pbrs_farm.run.relight import linear_aovs
+from pbrs_farm.transport.develop.mode_pictures import denoise_aovs
+
+
+def picture_radiance(view: ChosenView) -> F32 | None:
+    """(H, W, 3) linear radiance of the picture's light, denoised like it; None without radiance.exr."""
+    file = view.entry.file(RADIANCE_EXR)
+    if file is None:
+        return None
+    aovs = linear_aovs(radiance_from_exr(read_regular(file, MAX_SCENE_BYTES), str(file)))
+    develop = view.facts.get("modes", {}).get("develop", {})
+    if develop.get("denoised", False):
+        aovs = denoise_aovs(aovs)
+    groups = GROUPS_OF_MODE[Mode(view.picture)] if view.picture else ()
+    total = np.zeros_like(aovs.outdoor)
+    for group in groups or (Group.OUTDOOR, Group.INDOOR):
+        total = total + (aovs.outdoor if group is Group.OUTDOOR else aovs.indoor)
+    if view.choice.size is not None:
+        total = resized_by_area(total, *view.choice.size)
+    return np.asarray(total, np.float32)
 
 
 def intrinsic_layers(view: ChosenView) -> tuple[F32, F32, F32] | None:

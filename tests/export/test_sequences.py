@@ -48,7 +48,7 @@ def only(folder: Path) -> Path:
 def test_nerfstudios_poses_turn_the_home_to_z_up(root: Path, tmp_path: Path) -> None:
     n_views, n_files = export(root, tmp_path / "x", "nerfstudio")
     house = only(tmp_path / "x")
-    assert (n_views, n_files) == (6, 13)
+    assert (n_views, n_files) == (6, 19)
     transforms = json.loads((house / "transforms.json").read_text())
     turn = np.array([*transforms["applied_transform"], [0, 0, 0, 1]])
     assert len(transforms["frames"]) == 6
@@ -58,6 +58,7 @@ def test_nerfstudios_poses_turn_the_home_to_z_up(root: Path, tmp_path: Path) -> 
         np.testing.assert_allclose(frame["transform_matrix"], pose, atol=1e-12)
         assert (house / frame["file_path"]).is_file()
         assert (house / frame["depth_file_path"]).is_file()
+        assert (house / frame["normal_file_path"]).is_file()
     # The eye's height is the third coordinate.
     assert 1.4 < transforms["frames"][0]["transform_matrix"][2][3] < 1.7
 

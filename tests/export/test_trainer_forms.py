@@ -13,10 +13,12 @@ import pytest
 from PIL import Image
 
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.house_split import SplitShares
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.export.chosen_view import Choice
 from pbrs_farm.export.export_views import export, remarks_of
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
+from pbrs_farm.formats.radiance_exr import radiance_exr
 from pbrs_farm.images import array_from_png, layers_from_exr, png_from_array
 from pbrs_farm.run.local import run_local
 from pbrs_farm.run.local_run import Run
@@ -166,3 +168,110 @@ def test_fsd_without_exact_depth_names_its_step(root: Path, tmp_path: Path) -> N
 def test_views_without_a_partner_are_no_stereo_set(stills: Path, tmp_path: Path) -> None:
     with pytest.raises(BadInput, match="no view has a right one"):
         export(stills, tmp_path / "x", "fsd")
+
+
+def wai_overlap(scene: Path, frames: list[dict]) -> np.ndarray:
+    """Shares by the rule of the repository, for pictures of less than 224 px: nearest depth at integer pixels."""
+    depths = [layers_from_exr((scene / f["depth"]).read_bytes())["Y"] for f in frames]
+    shares = np.zeros((len(frames), len(frames)))
+    for i, frame in enumerate(frames):
+        h, w = depths[i].shape
+        v, u = np.mgrid[:h, :w]
+        z = depths[i]
+        local = np.stack([
+            (u - frame["cx"]) * z / frame["fl_x"], (v - frame["cy"]) * z / frame["fl_y"], z,
+        ], -1)  # fmt: skip
+        pose = np.array(frame["transform_matrix"])
+        world = local @ pose[:3, :3].T + pose[:3, 3]
+        for j, other in enumerate(frames):
+            inverse = np.linalg.inv(np.array(other["transform_matrix"]))
+            seen = world @ inverse[:3, :3].T + inverse[:3, 3]
+            expected = seen[..., 2]
+            with np.errstate(divide="ignore", invalid="ignore"):
+                x = other["fl_x"] * seen[..., 0] / np.abs(expected) + other["cx"]
+                y = other["fl_y"] * seen[..., 1] / np.abs(expected) + other["cy"]
+            inside = (x >= 0) & (x < w) & (y >= 0) & (y < h) & (expected > 0.04) & (z > 0)
+            column = np.rint(np.clip(np.nan_to_num(x), 0, w - 1)).astype(int)
+            row = np.rint(np.clip(np.nan_to_num(y), 0, h - 1)).astype(int)
+            allowed = 0.1 + 0.005 * expected - np.log(0.5) * 0.1
+            shares[i, j] = (inside & (np.abs(depths[j][row, column] - expected) < allowed)).mean()
+    return shares
+
+
+def test_wai_has_frames_depth_and_covisibility(root: Path, tmp_path: Path) -> None:
+    export(root, tmp_path / "set", "wai", shares=SplitShares(1, 0, 0))
+    split = tmp_path / "set/train"
+    (scene_name,) = np.load(split / "pbrs_farm_scene_list_train.npy")
+    scene = split / scene_name
+    meta = json.loads((scene / "scene_meta.json").read_text())
+    assert (meta["camera_convention"], meta["scale_type"]) == ("opencv", "metric")
+    assert len(meta["frames"]) == len(of_name(root)) == 6
+    for frame in meta["frames"]:
+        view = of_name(root)[frame["frame_name"]]
+        np.testing.assert_allclose(
+            frame["transform_matrix"], view.facts["world_from_camera_opencv"]
+        )
+        assert (frame["w"], frame["h"]) == (64, 48)
+        # Its loaders count pixels from the centre of the first one.
+        assert (frame["cx"], frame["cy"]) == pytest.approx((31.5, 23.5))
+        picture = array_from_png((scene / frame["file_path"]).read_bytes())
+        np.testing.assert_array_equal(picture, stored(view, "opengl_dl"))
+        depth = layers_from_exr((scene / frame["depth"]).read_bytes())["Y"]
+        np.testing.assert_array_equal(depth, stored(view, "depth_z"))
+    # As its loader maps the file: float32 from byte 128, the shape in its name.
+    file = scene / meta["scene_modalities"]["pairwise_covisibility"]["scene_key"]
+    shape = tuple(int(n) for n in file.stem.split("--")[1].split("x"))
+    matrix = np.memmap(file, np.float32, "r", offset=128, shape=shape)
+    assert shape == (6, 6)
+    has_depth = [
+        (stored(of_name(root)[f["frame_name"]], "depth_z") > 0).mean() for f in meta["frames"]
+    ]
+    np.testing.assert_allclose(matrix.diagonal(), has_depth, atol=1e-6)
+    assert 0.2 < matrix.min() < 0.999
+    # Points on the border round to outside in its rule.
+    np.testing.assert_allclose(matrix, wai_overlap(scene, meta["frames"]), atol=0.03)
+
+
+def test_covisibility_ends_at_a_wall() -> None:
+    """Two cameras 4 m from each other look at the two sides of a wall, 2 m away from either."""
+    from pbrs_farm.export.forms.wai import FramePoints, pairwise_covisibility
+
+    k = np.array([[10.0, 0, 5], [0, 10, 5], [0, 0, 1]])
+    turned = np.diag([-1.0, 1, -1, 1])
+    turned[2, 3] = 4
+    x, y = (g.ravel() for g in np.meshgrid(np.arange(10) + 0.5, np.arange(10) + 0.5))
+    wall = np.stack([(x - 5) / 5, (y - 5) / 5, np.full(100, 2.0)], 1)
+    depth = np.full((10, 10), 2, np.float32)
+    same = FramePoints(depth, k, np.eye(4), wall, 100)
+    thick = wall * [0.875, 0.875, 1] + np.array([0, 0, 0.25])
+    opposite = FramePoints(depth - np.float32(0.25), k, np.linalg.inv(turned), thick, 100)
+    shares = pairwise_covisibility([same, same, opposite])
+    np.testing.assert_array_equal(shares, [[1, 1, 0], [1, 1, 0], [0, 0, 1]])
+
+
+def test_nerfstudios_normals_and_linear_pictures(stills: Path, tmp_path: Path) -> None:
+    first = views_of(stills)[0]
+    light = np.random.default_rng(3).random((2, *stored(first, "depth").shape, 3), np.float32)
+    images = {"outdoor": light[0], "indoor": light[1], "albedo": light[0], "normal": light[0]}
+    (first.folder / "radiance.exr").write_bytes(radiance_exr(images))
+    choice = Choice(layers=("depth", "normal", "radiance"))
+    try:
+        export(stills, tmp_path / "set", "nerfstudio", choice=choice)
+    finally:
+        (first.folder / "radiance.exr").unlink()
+    house = tmp_path / "set" / first.house.id
+    frames = json.loads((house / "transforms.json").read_text())["frames"]
+    assert len(frames) == 2
+    for frame in frames:
+        view = of_name(stills)[Path(frame["file_path"]).stem]
+        values = array_from_png((house / frame["normal_file_path"]).read_bytes())
+        valid = stored(view, "valid") > 0
+        right, forward, up = np.moveaxis(stored(view, "normal") * (2 / 65535) - 1, -1, 0)
+        expected = np.stack([right, up, -forward], axis=-1)
+        np.testing.assert_allclose(values[valid] * (2 / 65535) - 1, expected[valid], atol=1e-4)
+        assert (values[~valid] == 0).all()
+    (frame,) = json.loads((house / "transforms_radiance.json").read_text())["frames"]
+    planes = layers_from_exr((house / frame["file_path"]).read_bytes())
+    # The picture of this view is OpenGL's, so all its light counts.
+    picture = np.stack([planes[c] for c in "RGB"], -1)
+    np.testing.assert_allclose(picture, light.sum(0), rtol=1e-6)

@@ -20,7 +20,6 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.frames import linear_from_srgb
-from pbrs_farm.core.lighting import GROUPS_OF_MODE, Group, Mode
 from pbrs_farm.export.chosen_view import (
     Choice,
     ChosenView,
@@ -30,15 +29,10 @@ from pbrs_farm.export.chosen_view import (
     require_lens,
 )
 from pbrs_farm.export.form import Convention, ViewForm
-from pbrs_farm.export.intrinsic_parts import parts_without_negatives
+from pbrs_farm.export.intrinsic_parts import parts_without_negatives, picture_radiance
 from pbrs_farm.export.sequences import pose_opencv
 from pbrs_farm.formats import hypersim
-from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
-from pbrs_farm.formats.radiance_exr import radiance_from_exr
 from pbrs_farm.images import jpeg_from_array
-from pbrs_farm.regular_files import MAX_SCENE_BYTES, read_regular
-from pbrs_farm.run.relight import linear_aovs
-from pbrs_farm.transport.develop.mode_pictures import denoise_aovs
 
 _MOST_SCENES: Final = 999  # scenes of a volume
 _MOST_LIGHT: Final = 65504.0  # maximum of a half float
@@ -249,25 +243,8 @@ def light_layers(view: ChosenView) -> dict[str, NDArray[np.float16]]:
         light_arrays |= {name: _half(part) for name, part in zip(names, parts, strict=True)}
         light, shading, rest = (light_arrays[name].astype(np.float32) for name in names)
         return light_arrays | {"color": _half(light * shading + rest)}
-    colour = _colour(view)
+    colour = picture_radiance(view)
     return light_arrays if colour is None else light_arrays | {"color": _half(colour)}
-
-
-def _colour(view: ChosenView) -> F32 | None:
-    """(H, W, 3) linear radiance of the picture, denoised like it; None without any."""
-    file = view.entry.file(RADIANCE_EXR)
-    if file is None:
-        return None
-    aovs = linear_aovs(radiance_from_exr(read_regular(file, MAX_SCENE_BYTES), str(file)))
-    develop = view.facts.get("modes", {}).get("develop", {})
-    if develop.get("denoised", False):
-        aovs = denoise_aovs(aovs)
-    groups = GROUPS_OF_MODE[Mode(view.picture)] if view.picture else ()
-    parts = groups or (Group.OUTDOOR, Group.INDOOR)
-    total = np.zeros_like(aovs.outdoor)
-    for group in parts:
-        total = total + (aovs.outdoor if group is Group.OUTDOOR else aovs.indoor)
-    return np.asarray(total, np.float32)
 
 
 def _half(array: NDArray[Any]) -> NDArray[np.float16]:

@@ -175,8 +175,7 @@ FORM = ViewForm(
     "a laser scan at each view's eye (`--scanner`: "
     + ", ".join(f"`{name}`" for name in LIDARS)
     + "):"
-    " `<house>/<view>.ply` and `.pcd`, `<house>/poses.txt`; a return has position, measured and exact range,"
-    " intensity, ring, class, instance, normal, and the glass and mirrors on its way",
+    " `<house>/<view>.ply` and `.pcd`, `<house>/poses.txt`",
     options=LidarOptions,
     convention=Convention(
         None,

@@ -13,14 +13,13 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.export.chosen_view import (
     Choice,
     ChosenView,
     depth_metres,
-    opengl_normals,
+    opengl_normals_png,
     require_lens,
 )
 from pbrs_farm.export.form import Convention, ViewForm, name_left_out, views_with_picture
@@ -51,7 +50,7 @@ def write_moge(views: list[ChosenView], out: Path, _choice: Choice) -> None:
         (out / folder / "image.jpg").write_bytes(picture)
         (out / folder / "depth.png").write_bytes(logarithmic_png(depth_metres(view), _is_sky(view)))
         if view.has("normal"):
-            (out / folder / "normal.png").write_bytes(png_from_array(_normals(view)))
+            (out / folder / "normal.png").write_bytes(png_from_array(opengl_normals_png(view)))
         size = np.array([[view.facts["width_px"]], [view.facts["height_px"]], [1.0]])
         meta = {"intrinsics": (np.array(view.facts["K"], np.float64) / size).tolist()}
         (out / folder / "meta.json").write_text(json.dumps(meta), "utf-8")
@@ -75,12 +74,6 @@ def logarithmic_png(metres: F64, is_infinite: Bools) -> bytes:
     steps = _FIRST + np.rint(np.clip(share, 0, 1) * (_LAST - _FIRST))
     values = np.where(is_infinite, _INFINITE, np.where(is_known, steps, 0)).astype(np.uint16)
     return png_from_array(values, texts={"near": repr(near), "far": repr(far)})
-
-
-def _normals(view: ChosenView) -> NDArray[np.uint16]:
-    normals = opengl_normals(view)
-    has_one = np.asarray(normals != 0).any(-1, keepdims=True)
-    return np.where(has_one, np.rint((normals + 1) / 2 * 65535), 0).astype(np.uint16)
 
 
 FORM = ViewForm(

@@ -77,8 +77,7 @@ FORM = ViewForm(
     "tum",
     write_tum,
     "`rgb.txt`, `depth.txt`, `groundtruth.txt`; depth 5000 a metre; the right views of pairs in"
-    " `rgb_right.txt`, `depth_right.txt`, `groundtruth_right.txt`, other cameras of a rig likewise; `left_out.txt` names views"
-    " outside sequences",
+    " `rgb_right.txt`, `depth_right.txt`, `groundtruth_right.txt`, other cameras of a rig likewise",
     lenses=("pinhole", "radtan"),
     is_of_frames=True,
     convention=Convention(

@@ -118,9 +118,8 @@ FORM = ViewForm(
     "yolo",
     write_yolo,
     "`images/<house>__<view>.png`, `labels/<house>__<view>.txt` (boxes; class = NYU40 id - 1; none for"
-    " wall, floor, ceiling), `data.yaml`, whose folders are relative to it: it works from any"
-    " directory. It always has `train` and `val`; if no home is in one, both name the same"
-    " folder, and a comment and the command say so. `left_out.txt` names views without a picture",
+    " wall, floor, ceiling), `data.yaml`, which works from any directory; if `train` or `val` has no home,"
+    " both name the same folder, and a comment says so",
     has_classes=True,
     finish=write_data_yaml,
     convention=Convention(0.5, axes="shares of the picture, from its corner"),
