@@ -50,20 +50,13 @@ class Limits:
         _check_config(self, f"{_PREFIX}LIMITS_")
 
     def deadline_s(self, stage: str) -> float:
-        """Time limit of a task of the stage, seconds.
-
-        Geometry, gl and light have separate limits; all merges share that of reduce.
-        """
+        """Time limit of a task of the stage, seconds; all merges share that of reduce."""
         return {GEOMETRY: self.geometry_s, GL: self.gl_s, LIGHT: self.light_s}.get(
             stage, self.reduce_s
         )
 
     def of_process(self, n_slots: int) -> ProcessLimits:
-        """The limits of the render process of one of n slots.
-
-        n_slots: slots of this machine. Where no memory limit is configured each slot gets its share
-        of the machine's; a process is replaced by a fresh one between tasks at half of it.
-        """
+        """Limits of the render process of one of n slots, by default its share of the machine's memory."""
         memory_mb = self.memory_mb or memory_share_mb(n_slots)
         return ProcessLimits(
             silence_s=self.silence_s,
@@ -136,10 +129,7 @@ class FarmConfig:
 
 
 def config_from_environment(environment: Mapping[str, str] | None = None) -> FarmConfig:
-    """FarmConfig from PBRS_STORE, PBRS_REDIS_URL and PBRS_FARM_<FIELD> (PBRS_FARM_LIMITS_<FIELD>).
-
-    PBRS_REDIS_PASSWORD(_FILE) is inserted into the URL unless it has one. Raises BadInput.
-    """
+    """FarmConfig from PBRS_STORE, PBRS_REDIS_URL (and password), PBRS_FARM_<FIELD>; BadInput."""
     env = dict(os.environ if environment is None else environment)
     settings = settings_from_environment(env)
     password = value_or_file(env, "PBRS_REDIS_PASSWORD")
@@ -165,10 +155,7 @@ def config_from_environment(environment: Mapping[str, str] | None = None) -> Far
 
 
 def make_scratch(config: FarmConfig) -> None:
-    """Create the scratch folder if needed. Raises MachineFailed if it is not writable.
-
-    An existing folder is only tested. Call it once at the start of a process, before it works.
-    """
+    """Create the scratch folder if needed, at a process's start; MachineFailed if it is not writable."""
     # A file in its place, a read-only folder, another user's folder: one line for each.
     fault = ""
     try:
@@ -238,9 +225,6 @@ def _with_password(url: str, password: str) -> str:
 
 
 def shown_url(url: str) -> str:
-    """A URL without its password, for messages.
-
-    User and password go both; the rest stays, also words of a query, so put no secret there.
-    """
+    """A URL without user and password, for messages; a query is kept, so put no secret there."""
     parts = urlsplit(url)
     return urlunsplit(parts._replace(netloc=parts.netloc.rpartition("@")[2]))

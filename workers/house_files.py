@@ -1,7 +1,4 @@
-"""Houses on their way to the workers: arguments of the user -> entries of a job, files into the store.
-
-Effects: reads the user's files, writes the store; on a worker, fills its cache from the store.
-"""
+"""Arguments of the user -> entries of a job, with their files through the store into a worker's cache."""
 
 from __future__ import annotations
 
@@ -33,10 +30,7 @@ _LIBRARIES: Final = f"{FOLDER}libraries/"  # the user's own, to dress with
 def entries_from_arguments(
     arguments: Sequence[str], seeds: Sequence[int] = (0,), *, models: str = ""
 ) -> list[tuple[HouseEntry, SourceRef]]:
-    """Resolve arguments to houses: files, folders of files, example homes, `builtin`.
-
-    One house per home and dressing seed. Does not access a store. Raises BadHouse for any other argument.
-    """
+    """Resolve arguments to houses, one per home and dressing seed, without a store; BadHouse."""
     # Take each house once, whatever arguments name it.
     entries: dict[str, tuple[HouseEntry, SourceRef]] = {}
     files = SourceFiles()
@@ -53,10 +47,7 @@ def entries_from_arguments(
 
 
 def upload(store: Store, refs: Sequence[SourceRef]) -> None:
-    """Put into the store what workers elsewhere need: the files, and the example homes' package.
-
-    Folders (SUNCG, glTF with side files) are not copied: workers must see them at the same path.
-    """
+    """Put files and the example homes' package into the store; folders must be at the same path for workers."""
     # A source in one file goes into the store, below its home's id, once for all its variants.
     for place, path in {_source_in_store(ref).location: ref.location for ref in refs}.items():
         if place != path:
@@ -111,18 +102,12 @@ def _upload_package(store: Store, files: DebFiles) -> None:
 
 
 def is_left_in_place(ref: SourceRef) -> bool:
-    """True if the source is read in place, so every worker needs access to it.
-
-    SUNCG, files with companions or with a folder of models, and sources of plugins.
-    """
+    """True if each worker reads the source in place: SUNCG, companions or models, plugins."""
     return format_of_source(ref) is not None and _source_in_store(ref).location == ref.location
 
 
 def placed_reference(path: Path) -> tuple[str, bytes]:
-    """Key and bytes of the reference file a job is to be selected against; BadInput if none.
-
-    The key is named by the content, so putting it again is harmless. Nothing is written here.
-    """
+    """Content key and bytes of a job's reference file for select; BadInput without it."""
     from pbrs_farm.curate.reference_build import read_reference
     from pbrs_farm.selection.reference_set import bytes_from_reference
 
@@ -192,10 +177,7 @@ def local_catalogue(store: Store, recipe: Recipe) -> Recipe:
 
 
 def fill_cache(store: Store, *, with_furniture: bool = False) -> None:
-    """On a worker: take packages from the store that are not cached here.
-
-    The example homes' package, and the furniture's where a house is dressed or made.
-    """
+    """On a worker: take missing packages from the store, the furniture's for dressed or made houses."""
     # Download only missing packages.
     packages = [homes_package.FILES] if homes_package.cached() is None else []
     if with_furniture and not has_furniture():

@@ -48,11 +48,7 @@ class TaskId:
 
 
 def task_from_text(text: str) -> TaskId:
-    """The task a word names; raises BadInput when it cannot be one.
-
-    text: "HOUSE/UNIT/STAGE", as messages, logs and the command line have it. Only the form is
-    checked, not whether a job has such a task.
-    """
+    """The task "HOUSE/UNIT/STAGE", which need not exist; BadInput for any other form."""
     match = _TASK.fullmatch(text)
     if match is None or match[3] not in STAGES:
         raise BadInput(repr(text[:120]), "", "not a task", hint="HOUSE/UNIT/STAGE")
@@ -60,20 +56,12 @@ def task_from_text(text: str) -> TaskId:
 
 
 def group_text(tasks: Sequence[TaskId]) -> str:
-    """Tasks of one house and stage as a message names them: HOUSE/UNIT,UNIT/STAGE.
-
-    tasks: at least one; house and stage are read from the first, and nothing checks that the others
-    share them. `tasks_from_group` reads it.
-    """
+    """Tasks (at least one) of one house and stage as a message: HOUSE/UNIT,UNIT/STAGE."""
     return f"{tasks[0].house}/{','.join(t.unit for t in tasks)}/{tasks[0].stage}"
 
 
 def tasks_from_group(text: str) -> tuple[TaskId, ...]:
-    """The tasks a message names; raises BadInput when it names none, or too many.
-
-    A message of one task is a group of one. Every task is checked as `task_from_text` does, since a
-    message may come from anybody who reaches the broker.
-    """
+    """The tasks a message, maybe a stranger's, names; BadInput for none, too many or a wrong one."""
     house, _, rest = text.partition("/")
     units, _, stage = rest.partition("/")
     names = units.split(",", MOST_IN_GROUP)
@@ -81,84 +69,52 @@ def tasks_from_group(text: str) -> tuple[TaskId, ...]:
 
 
 def check_job_id(text: str) -> str:
-    """text itself, if it is 12 hex digits; raises BadInput otherwise.
-
-    Call it before a word of a user becomes part of a key: nothing else keeps "../" out of it.
-    """
+    """text, if it is 12 hex digits, before it enters a key (no "../"); BadInput otherwise."""
     if not _JOB_ID.fullmatch(text):
         raise BadInput(repr(text[:40]), "", "not a job", hint="12 hex digits, as `submit` prints")
     return text
 
 
 def queue_of(stage: str, *, gpu: bool) -> str:
-    """The queue a stage's tasks go to: by kind of worker, not by job.
-
-    gpu: whether the job's light runs on GPUs; it matters to the stage light alone. The merges of
-    houses, shards and jobs share one queue. `stages_of_queue` is the way back.
-    """
+    """The queue of a stage's tasks, by kind of worker (gpu: of light); all merges share one."""
     if stage in (REDUCE, SHARD, JOB):
         return REDUCE
     return LIGHT_GPU if gpu and stage == LIGHT else stage
 
 
 def pool_of(stage: str, *, gpu: bool) -> str:
-    """The pool of a stage's tasks, with its own window and leases.
-
-    A pool is a stage, except that light on a GPU is a separate one: messages without a worker block no others.
-    """
+    """The pool of a stage's tasks, with its own window and leases: the stage, but light on GPUs apart."""
     return LIGHT_GPU if gpu and stage == LIGHT else stage
 
 
 def stage_of_pool(pool: str) -> str:
-    """The stage whose tasks a pool has.
-
-    A pool is a stage, but that light has two: on GPUs and without. So several pools may give one
-    stage.
-    """
+    """The stage whose tasks a pool has; light has two pools."""
     return LIGHT if pool == LIGHT_GPU else pool
 
 
 def stages_of_queue(queue: str) -> tuple[str, ...]:
-    """The stages whose tasks a queue carries.
-
-    In the order of STAGES; a queue of light carries light alone, the queue of merges three. An
-    unknown name gives ().
-    """
+    """The stages, in order, whose tasks a queue carries; () for an unknown name."""
     return tuple(s for s in STAGES if queue in (queue_of(s, gpu=False), queue_of(s, gpu=True)))
 
 
 def job_key(job: str, file: str = "job.json") -> str:
-    """Key of one of the job's own objects: job.json, houses.jsonl, logs/..., failed/...
-
-    file: below the job's folder; neither it nor the id is checked here (`check_job_id`).
-    """
+    """Key of a file in the job's folder: job.json, houses.jsonl, logs/...; neither is checked."""
     return f"jobs/{job}/{file}"
 
 
 def log_key(job: str, task: str, attempt: int) -> str:
-    """Key of a task's log: of a failed attempt, and of a long one while it runs.
-
-    task: as text; its slashes are flattened. attempt: counts from 1; one log each.
-    """
+    """Key of a task's log, its slashes flattened, by attempt (from 1): a failed or a long one."""
     return job_key(job, f"logs/{_flat_name(task)}.{attempt}.txt")
 
 
 def attempts_from_log_keys(job: str, task: str, keys: Iterable[str]) -> dict[int, str]:
-    """Attempt -> the key of its log, for the keys of the task's logs.
-
-    keys: any keys, as from a listing of the job's logs; those of other tasks are ignored. Empty if the task
-    has no log: only failures and long tasks have one.
-    """
+    """Attempt -> key of its log, from keys that may be of other tasks."""
     pattern = re.compile(re.escape(log_key(job, task, 0)).replace(r"\.0\.txt", r"\.(\d+)\.txt"))
     return {int(match[1]): key for key in keys if (match := pattern.fullmatch(key))}
 
 
 def failed_key(job: str, task: str) -> str:
-    """Key of the record of a task that failed for good; survives the loss of Redis.
-
-    `task_from_failed_key` reads the task from it again. `retry` deletes the record; the job's last
-    merge reads all of them.
-    """
+    """Key of the record, which outlives Redis, of a task that failed for good; `retry` deletes it."""
     return job_key(job, f"failed/{_flat_name(task)}.json")
 
 
@@ -178,10 +134,7 @@ def _flat_name(task: str) -> str:
 
 
 def priority_from_text(text: str) -> int:
-    """Parse a priority. Raises BadInput for anything but a number from 0 to 9.
-
-    0 goes first. A sign, a space or a second digit is an error, so that "10" is not read as 1.
-    """
+    """Parse a priority, one digit, 0 first; BadInput for anything else."""
     if len(text) != 1 or not text.isascii() or not text.isdigit():
         hint = f"a number from 0, the first, to {LEAST_URGENT}"
         raise BadInput(repr(text[:40]), "", "not a priority", hint=hint)

@@ -33,11 +33,7 @@ def work_version() -> str:
 
 
 class HouseEntry(Record):
-    """A house of a job: its id, and what its geometry task reads.
-
-    house_id: unique in the job, and a folder of the store. The source is text for the runner
-    alone: the farm passes it on unread.
-    """
+    """A house of a job: its id, which is a folder of the store, and its source as text for the runner."""
 
     house_id: str
     source: str = ""  # JSON the runner understands; it travels to the geometry task only
@@ -116,10 +112,7 @@ class SubmitRequest(
 
 
 class JobSpec(FarmOptions, Wanted):
-    """Everything a job is made with except its houses; stored as jobs/<id>/job.json.
-
-    A batch is some views of a house that one task makes; job.json calls it a group.
-    """
+    """Everything a job is made with except its houses; stored as jobs/<id>/job.json."""
 
     model_config = ConfigDict(validate_by_name=True, serialize_by_alias=True)
     job_id: str
@@ -166,19 +159,11 @@ def job_id(spec: JobSpec, houses: Iterable[HouseEntry]) -> str:
 
 
 def lines_from_houses(houses: Iterable[HouseEntry]) -> bytes:
-    """houses.jsonl: a house a line, in the job's order.
-
-    `houses_from_lines` reads it. The line's number is the house's index, by which shards are cut:
-    do not sort it.
-    """
+    """houses.jsonl: a house a line in the job's order, by which shards are cut."""
     return "".join(house.model_dump_json() + "\n" for house in houses).encode()
 
 
 def houses_from_lines(data: bytes) -> Iterator[HouseEntry]:
-    """The houses of a houses.jsonl.
-
-    An iterator, so that memory does not hold a million houses. Raises pydantic's ValidationError for an
-    invalid line: the file is always written by this program.
-    """
+    """The houses of a houses.jsonl, one by one; ValidationError for an invalid line."""
     for line in data.splitlines():
         yield HouseEntry.model_validate_json(line)

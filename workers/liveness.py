@@ -17,30 +17,18 @@ STALE_S: Final = 120.0  # main loops touch the file every few seconds
 
 
 def alive_file(scratch: Path, worker: str) -> Path:
-    """The file a worker's or coordinator's main loop touches.
-
-    worker: its name (PBRS_FARM_WORKER, else the host's). Nothing is created: `touch` does that.
-    """
+    """The file that the main loop of a worker or coordinator of that name touches."""
     return scratch / f"pbrs-{worker}.alive"
 
 
 def touch(path: Path) -> None:
-    """Set the file's time to now; it appears if need be.
-
-    For liveness probes: whoever reads the file looks at its age alone. Raises OSError where the
-    folder cannot be written.
-    """
+    """Set the file's time, made if missing, to now, for liveness probes. Raises OSError."""
     path.touch()
     os.utime(path)
 
 
 def main() -> int:
-    """0 while the process on this machine is alive; 1 and a line when not.
-
-    For a container's probe, so it imports nothing of the farm and needs neither Redis nor the
-    store. The environment names folder and worker (PBRS_FARM_SCRATCH, PBRS_FARM_WORKER); a process
-    whose file was not touched for STALE_S seconds counts as dead.
-    """
+    """0 if the process named by PBRS_FARM_SCRATCH and _WORKER touched its file within STALE_S, else 1 and a line."""
     scratch = Path(os.environ.get("PBRS_FARM_SCRATCH") or tempfile.gettempdir())
     path = alive_file(scratch, os.environ.get("PBRS_FARM_WORKER") or platform.node())
     try:

@@ -13,10 +13,7 @@ _SECRETS: Final = re.compile(r"(rediss?://[^:/@\s]*:)[^@\s]+@")
 
 
 class NoSecrets(logging.Formatter):
-    """Formats a record with the passwords of Redis URLs replaced by ***.
-
-    A temporary refusal of Redis is one line: kombu adds its traceback to a message that says all.
-    """
+    """Formats a record with Redis URLs' passwords as ***, a passing refusal as one line."""
 
     def format(self, record: logging.LogRecord) -> str:
         if record.exc_info and isinstance(record.exc_info[1], RefusedForNow):
@@ -25,11 +22,7 @@ class NoSecrets(logging.Formatter):
 
 
 def log_to_stderr(level: int | str = "INFO") -> None:
-    """Log to stderr with time, process and level; passwords in URLs are replaced by ***.
-
-    For the main function of a process, never for library code: it replaces all handlers of the root
-    logger. Calling it again is harmless.
-    """
+    """Log to stderr, passwords as ***, instead of all root handlers: for main functions alone."""
     handler = logging.StreamHandler(sys.stderr)
     handler.setFormatter(NoSecrets("%(asctime)s %(process)d %(levelname)s %(name)s: %(message)s"))
     root = logging.getLogger()

@@ -21,11 +21,7 @@ OnText = Callable[[str], None]
 
 
 class TaskRequest(Record):
-    """A task for the runner, as it crosses to the render process.
-
-    unit: "-" for the house or job as a whole, a number for a batch of views, "s3" for shard 3
-    (workers/ids.py).
-    """
+    """A task for the render process; unit: "-" (house, job), "0" (a batch) or "s3" (a shard)."""
 
     job_id: str
     house: str
@@ -77,11 +73,7 @@ RunnerMaker = Callable[[FarmConfig, OnText], StepRunner]
 
 
 def runner_maker(name: str) -> RunnerMaker:
-    """The function a `module:function` of this machine's own configuration names.
-
-    It is called with the configuration and with what to call while storage does not answer.
-    Names never come from messages. Raises BadInput.
-    """
+    """The function that `module:function` of this machine's configuration, never a message, names; BadInput."""
     module, _, attribute = name.partition(":")
     try:
         maker: RunnerMaker = getattr(import_module(module), attribute)

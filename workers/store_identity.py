@@ -1,7 +1,4 @@
-"""Identity of a store: an id inside it, since one store has many URLs.
-
-Effects: reads the store, and writes the id there once.
-"""
+"""Identity of a store, which may have many URLs: an id inside it, written once."""
 
 from __future__ import annotations
 
@@ -15,11 +12,7 @@ KEY: Final = "jobs/store.id"
 
 
 def known_store_id(store: Store) -> str:
-    """The store's id, "" if it does not exist yet.
-
-    Only reads, so it suits a client without write access. At most 64 characters. Other StoreFailed are passed
-    on.
-    """
+    """The store's id, "" if it does not exist yet; only reads, for clients without write access."""
     try:
         return store.get(KEY).decode("ascii", "replace").strip()[:64]
     except ObjectMissing:
@@ -27,11 +20,7 @@ def known_store_id(store: Store) -> str:
 
 
 def store_id(store: Store) -> str:
-    """The store's id, created on first use.
-
-    16 random hex digits. Of several processes with a new store one writes, and all read that id. Two URLs with
-    one id are one store.
-    """
+    """The store's id, 16 random hex digits, made on first use; of several processes one writes it."""
     if not (identity := known_store_id(store)):
         store.put_if_absent(KEY, secrets.token_hex(8).encode())
         identity = known_store_id(store)

@@ -1,7 +1,4 @@
-"""Texture coordinates for meshes without any, by box projection in the item's axes; no effects.
-
-Each connected board has its grain along its longest side.
-"""
+"""Texture coordinates by box projection in the item's axes, the grain along a board; no effects."""
 
 from __future__ import annotations
 
@@ -63,10 +60,7 @@ def box_mapped(
 
 
 def area_of_look(item: Item, surface: Surface) -> float:
-    """Area in m2 that determines a surface's finish: for an item with joints, all of one material.
-
-    Doors and drawers are separate surfaces, and small ones must not look different from large ones.
-    """
+    """Area in m2 that chooses a surface's finish: of an item with joints, all of one material."""
     alike = (
         [s for s in item.surfaces if s.material == surface.material] if item.joints else [surface]
     )
@@ -74,10 +68,7 @@ def area_of_look(item: Item, surface: Surface) -> float:
 
 
 def connected_parts(surface: Surface, axes: F64) -> Int:
-    """(V,) number of the connected part of each vertex of a surface, from 0.
-
-    Vertices within 0.1 mm are one. axes: (3, 3), columns are the axes along which places are compared.
-    """
+    """(V,) number, from 0, of the connected part (to 0.1 mm) of each vertex; axes: (3, 3) to compare along."""
     return _parts_of(surface.positions.astype(np.float64) @ axes, surface.faces)
 
 

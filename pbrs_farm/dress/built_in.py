@@ -46,10 +46,7 @@ _TO_STREET: Final = ("front", "garage", "entrance")
 def finish_built_in_parts(
     house: MutableHouse, catalogue: Catalogue, style: Style, share: float
 ) -> None:
-    """Give doors, windows, stairs, railings and fitted appliances the finishes of the home's scheme.
-
-    share: of the item kinds (all doors, all windows, ...) that are changed.
-    """
+    """Give a share of the kinds of doors, windows, stairs and appliances the scheme's finishes."""
     scheme = finish_scheme(house, style)
     kinds = {
         kind: float(house.rng(PASS, kind).random()) < share

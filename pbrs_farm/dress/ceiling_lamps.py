@@ -74,10 +74,7 @@ def hang_from_ceiling(
 def _choices(
     catalogue: Catalogue, style: Style, room: RoomSpace, rng: np.random.Generator
 ) -> list[tuple[Piece, Shape | None]]:
-    """Lamps that suit the room, in a drawn order; a flat dome last, which fits nearly everywhere.
-
-    The shape of a piece of the catalogue is not loaded yet: None.
-    """
+    """Lamps that suit the room, in a drawn order, with no shape loaded; a flat dome, which mostly fits, last."""
     generated: list[tuple[Piece, Shape | None]] = [
         ceiling_dome(rng, style),
         globe_pendant(rng, style),

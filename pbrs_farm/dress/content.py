@@ -1,8 +1,4 @@
-"""Tables of the content that dressing draws from; no effects.
-
-Dressing is the mechanism and imports no content. PROVIDER is the module that fills the tables; it is
-imported when they are first asked for. Plugins add families of furniture to it.
-"""
+"""Tables of the content that dressing draws from, filled by the module PROVIDER at first use."""
 
 from __future__ import annotations
 

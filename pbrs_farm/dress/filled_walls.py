@@ -56,11 +56,7 @@ class _Stretch(NamedTuple):
 def fill_wall(
     house: MutableHouse, catalogue: Catalogue, floor: RoomFloor, part: str, share: float
 ) -> None:
-    """Fill one wall of the room, by chance, with a piece of the catalogue stretched to its length.
-
-    share: 0..1 of the chances. The wall is free from one end of the piece to the other, and what the
-    piece leaves free of the floor is as for all added furniture.
-    """
+    """Fill one free wall by chance (share: of it) with a piece stretched to its length, if ways stay free."""
     rng = house.rng(part, "filled", floor.room.room.id)
     has = {house.items[n].nyu40 for n in floor.room.items}
     for group, chance in _FILE.rooms.get(floor.room.kind, {}).items():

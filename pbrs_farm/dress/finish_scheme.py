@@ -40,10 +40,7 @@ class FinishScheme:
 
 
 def finish_scheme(house: MutableHouse, style: Style) -> FinishScheme:
-    """The home's scheme of finishes, drawn by the house's seed and the style.
-
-    It has its own random stream, so that every pass gets the same.
-    """
+    """The home's scheme of finishes by seed and style, the same in every pass."""
     rng = house.rng("joinery")
     trim = _trim_finish(rng, style)
     leaf = _leaf_finish(rng, style, trim)

@@ -62,10 +62,7 @@ class LaidMaterial:
 
 
 def finish_furniture(house: MutableHouse, catalogue: Catalogue, style: Style, share: float) -> None:
-    """Give a share of the furniture's plain parts the look of what they are made of.
-
-    Parts of one colour in one room get one look, so that sets stay sets.
-    """
+    """Give a share of the plain parts the look of their material, one for a colour and room."""
     groups = {p.id: p.group for p in catalogue.pieces}
     n_source = len(house.source.items)
     for index, item in enumerate(house.items):

@@ -27,11 +27,7 @@ Scale = tuple[float, float, float]  # along a piece's width, height, depth
 
 
 def scale_of(piece: Piece, place: OldPlace) -> Scale | None:
-    """Scale at which a piece fills the old footprint; None if it does not fit.
-
-    Each side is 75 to 100 % of the old one, the height within 15 %. Pieces made of boards may be
-    stretched by up to STRETCH along one axis; all others keep their proportions.
-    """
+    """Scale to the old footprint (75 to 100 %, height within 15 %, boards up to STRETCH more); or None."""
     width, depth, height = piece.size
     old_width, old_depth, old_height = place.size
     if min(width, depth, height) <= 0:
@@ -55,20 +51,13 @@ def scale_of(piece: Piece, place: OldPlace) -> Scale | None:
 def own_or_all(
     pieces: Sequence[Piece], own: frozenset[str], share: float, rng: np.random.Generator
 ) -> Sequence[Piece]:
-    """Only the user's own pieces with probability share, else all of them.
-
-    own: Catalogue.own. Without any own piece no random number is drawn, so that results without a
-    user library do not change.
-    """
+    """Only the user's own pieces, if any, with probability share (drawn only then), else all."""
     mine = [piece for piece in pieces if piece.id in own]
     return mine if mine and rng.random() < share else pieces
 
 
 def common_scale(piece: Piece, places: Sequence[OldPlace]) -> Scale | None:
-    """The scale at which a piece fits every place of a set; None where it fits not all.
-
-    A set's members are of one size, or nearly so.
-    """
+    """The scale at which a piece fits every place of a set, of about one size; or None."""
     scales = [scale_of(piece, place) for place in places]
     valid = [s for s in scales if s is not None]
     if len(valid) < len(places):
@@ -79,8 +68,5 @@ def common_scale(piece: Piece, places: Sequence[OldPlace]) -> Scale | None:
 
 
 def is_lit_alike(piece_has_lights: bool, items: Sequence[Item]) -> bool:
-    """True if a piece can carry the lights of the items that it would replace.
-
-    A lamp with a light needs a piece with a light source; other items accept any piece.
-    """
+    """True if a piece has a light source, where the items that it would replace have a light."""
     return piece_has_lights or not any(item.lights for item in items)

@@ -1,8 +1,4 @@
-"""The pass `furniture`: add pieces along free walls, room by room; no effects.
-
-A piece is placed with its back to a wall that is free, blocks no way and no door, and leaves most
-of the floor and a good part of the wall free.
-"""
+"""The pass `furniture`: add pieces with their back at free walls, all ways and most floor kept free; no effects."""
 
 from __future__ import annotations
 

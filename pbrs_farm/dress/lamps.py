@@ -189,10 +189,7 @@ def _spot_on_top(
 
 
 def add_lamps(house: MutableHouse, catalogue: Catalogue, style: Style, share: float) -> None:
-    """Hang a lamp in rooms without one or with too little light; add table lamps by sofas and beds.
-
-    share: of such rooms, 0..1.
-    """
+    """Hang lamps in a share of the rooms with too little light; add table lamps by sofas and beds."""
     for room_id in [room.room.id for room in house_space(house).rooms]:
         rng = house.rng("lamps", room_id)
         room = house_space(house).room(room_id)

@@ -135,10 +135,7 @@ def _lamp_of(
 
 
 def with_flux(shape: Shape, flux_lm: float) -> Shape:
-    """Scale the shape's lights to a total luminous flux (lm), in equal shares.
-
-    A shape without lights is unchanged.
-    """
+    """Scale the shape's lights, if any, to a total luminous flux (lm), in equal shares."""
     n = max(len(shape.lights), 1)
     lights = tuple(
         replace(light, power=round(flux_lm, 1), unit=PowerUnit.LUMEN, share=1.0 / n)

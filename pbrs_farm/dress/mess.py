@@ -1,7 +1,4 @@
-"""The pass `mess`: displaced chairs, pictures a degree askew; no effects.
-
-Small items use the same share for their disorder: beds, clothes, tables, shoes, books (clutter/).
-"""
+"""The pass `mess`: displaced chairs, pictures a degree askew; clutter/ uses its share, too; no effects."""
 
 from __future__ import annotations
 
@@ -36,10 +33,7 @@ _HUNG_M: Final = 0.2  # smaller pictures are on furniture, metres
 
 
 def move_chairs(house: MutableHouse, _catalogue: Catalogue, _style: Style, share: float) -> None:
-    """Displace chairs at tables and desks as people do when they get up: most slightly, some far.
-
-    share: 0..1, of chairs that were just left. No chair blocks a door or overlaps an item.
-    """
+    """Displace a share of the chairs at tables as people getting up do, where no door or item is."""
     space = house_space(house)
     around = Neighbours(house.items)
     for room in space.rooms:

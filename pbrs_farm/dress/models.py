@@ -29,10 +29,7 @@ def standing_piece(
     textures: Iterable[Texture] = (),
     joints: Sequence[Joint] = (),
 ) -> Model:
-    """One piece from parts, the middle of its base at the origin; one surface a material.
-
-    Parts that move have separate surfaces. joints: in the frame of the parts.
-    """
+    """One piece from parts, base centred at the origin, a surface per material and moving part."""
     materials: list[Material] = []
     gathered: dict[tuple[int, bool, str], list[Surface]] = {}
     for surface, material in parts:

@@ -69,18 +69,11 @@ class MutableHouse:
         return self.materials.textures()
 
     def rng(self, *words: str | int) -> np.random.Generator:
-        """An independent random stream for each (house, seed, words).
-
-        Equal words give the same stream from its start at each call.
-        """
+        """An independent random stream, from its start, for each (house, seed, words)."""
         return np.random.default_rng(keys.seed(self.source.id, "dress", self.seed, *words))
 
     def material(self, material: Material, textures: Iterable[Texture] = ()) -> int:
-        """Add a material where no equal one is there; its number, for Surface.material.
-
-        textures: those that it names. Numbers are of this house while it is dressed: `frozen` leaves
-        out what nothing uses and numbers the rest anew.
-        """
+        """Number of a material, added unless known, until `frozen` renumbers them; textures: those it names."""
         return self.materials.add(material, textures)
 
     def placed(
@@ -191,10 +184,7 @@ def _placed_box(shape: Shape, turn: F64, factor: F64, at: F64) -> Box | None:
 
 
 def moved_item(item: Item, step: F64, turn: F64 | None = None, about: F64 | None = None) -> Item:
-    """The item turned by (3, 3) about a point of the world, then moved by step; a new item.
-
-    step, about: (3,) metres; about is the origin by default. Normals, box and lights go along.
-    """
+    """The item with all its parts turned by (3, 3) about a point (the origin), then moved by step, metres."""
     turn = np.eye(3) if turn is None else turn
     pivot = np.zeros(3) if about is None else about
 

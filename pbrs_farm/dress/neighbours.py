@@ -1,7 +1,4 @@
-"""The items around an item: overlaps, contents, support.
-
-State: a cache of bounds, triangles and cubes.
-"""
+"""The items around an item: overlaps, contents, support; caches bounds, triangles and cubes."""
 
 from __future__ import annotations
 
@@ -27,10 +24,7 @@ Cubes = NDArray[np.int64]
 
 
 class Neighbours:
-    """The items of a house with their bounds and triangles, found anew when an item is another object.
-
-    items: the list itself, which may change between calls; items are named by their place in it.
-    """
+    """The items of a list that may change, by index, with bounds and triangles of current objects."""
 
     def __init__(self, items: Sequence[Item]) -> None:
         self.items = items
@@ -51,20 +45,13 @@ class Neighbours:
         return self._triangles[id(item)][1]
 
     def near(self, low: F64, high: F64) -> list[int]:
-        """Places of the items whose bounds meet the box low..high (3,), metres; no walls, floors, ceilings.
-
-        A first, cheap test: bounds that meet say nothing of surfaces.
-        """
+        """Indices of the items, but structure, whose bounds meet the box low..high (3,), metres."""
         bounds = self.bounds()
         meets = ((bounds[:, 1] >= low) & (bounds[:, 0] <= high)).all(1)
         return [int(k) for k in np.flatnonzero(meets) if not self.items[int(k)].kind.is_structure]
 
     def n_shared(self, item: Item, without: Collection[int]) -> int:
-        """Number of 2 cm cubes that an item's surface shares with other items' surfaces.
-
-        The item need not be in the house. without: indices of items to ignore, such as its own. Compare
-        with the old item's number: touching items share some cubes.
-        """
+        """Number of 2 cm cubes shared with others' surfaces, `without` ignored: compare with an old item's."""
         low, high = item.bounds
         around = np.stack([low - CUBE_M, high + CUBE_M])
         others = []
@@ -98,10 +85,7 @@ _LEFT_ALONE: Final = frozenset({ItemKind.DOOR, ItemKind.WINDOW, ItemKind.STAIRS}
 
 
 def things_on(around: Neighbours, index: int) -> tuple[list[int], list[int]]:
-    """(contents on top of an item, items inside or under it), as indices; index: the item's.
-
-    Structure, doors and windows, and flat items below it, are excluded.
-    """
+    """(contents on top, items inside or under it) of an item; no structure, doors or flat items below."""
     bounds = around.bounds()
     (low, high), corners = bounds[index], around.triangles(around.items[index])
     on: list[int] = []
@@ -137,11 +121,7 @@ ALIKE_HELD: Final[Mapping[Place, frozenset[Place]]] = {
 
 
 def held_by(house: MutableHouse, around: Neighbours, index: int, group: str) -> Place:
-    """Support of items[index]: the floor, another piece (SURFACE), a wall or the ceiling.
-
-    group: of the catalogue; ceiling lamps hang whatever is below. Items without support from below are
-    assumed to hang on a wall.
-    """
+    """Support of items[index]: floor, SURFACE, ceiling (of ceiling lamps), else a wall."""
     if HELD.get(group) is HeldBy.TOP:
         return Place.CEILING
     item, low_y = around.items[index], float(around.bounds()[index, 0, 1])
@@ -161,30 +141,21 @@ def held_by(house: MutableHouse, around: Neighbours, index: int, group: str) -> 
 
 
 def height_above_floor(house: MutableHouse, item: Item, low_y: float) -> float:
-    """Metres from the floor of the item's room, else of its storey, to a world height low_y.
-
-    0 where neither is known.
-    """
+    """Metres from the floor of the item's room, else storey, to world height low_y; 0 if unknown."""
     floors = [room.floor_y for room in house.source.rooms if room.id == item.room_id]
     floors += [lv.elevation for lv in house.source.levels if lv.id == item.level_id]
     return low_y - floors[0] if floors else 0.0
 
 
 def lowest_points(item: Item) -> F64:
-    """(N, 3) vertices within 5 cm of the item's base, which can touch the support.
-
-    About 600 at most, evenly subsampled.
-    """
+    """(N, 3) vertices, about 600 at most, within 5 cm of the item's base."""
     points = np.concatenate([s.positions for s in item.surfaces]).astype(np.float64)
     points = points[points[:, 1] <= points[:, 1].min() + _LOW_PART_M]
     return np.asarray(points[:: max(1, len(points) // 600)])
 
 
 def drop_onto(item: Item, corners: F64) -> float | None:
-    """Vertical offset (m, upwards) that puts an item on triangles (F, 3, 3) seen from above.
-
-    None if most of its foot would be unsupported.
-    """
+    """Vertical offset (m) that puts an item on triangles (F, 3, 3); None if mostly unsupported."""
     points = lowest_points(item)
     height = highest_below(points[:, [0, 2]], corners)
     gap = points[:, 1] - height

@@ -29,10 +29,7 @@ _BACKED: Final = frozenset({"chair", "office_chair", "armchair", "sofa", "bed"})
 
 
 class HeldBy(Enum):
-    """The part of a piece that stays fixed when its model is replaced: back, centre or top.
-
-    Both BACK and CENTRE keep the base's height.
-    """
+    """The part of a piece that stays when its model is replaced: back, centre (both at the base) or top."""
 
     BACK = "back"
     CENTRE = "centre"
@@ -89,10 +86,7 @@ class OldPlace:
 
 
 def old_place(item: Item, group: str) -> OldPlace | None:
-    """Place of an item; None if it is tilted or its front is unknown.
-
-    The front is its box's third axis; for seats and beds the back rest gives the direction.
-    """
+    """Place of an item, front by its box or, of seats and beds, its back rest; None if tilted or unknown."""
     if item.box is None or item.box.axes[1, 1] < _UPRIGHT or not item.n_faces:
         return None
     points = np.concatenate([s.positions for s in item.surfaces]).astype(np.float64)
@@ -111,10 +105,7 @@ def old_place(item: Item, group: str) -> OldPlace | None:
 
 
 def before_boards(place: OldPlace, boards: Sequence[F64]) -> OldPlace:
-    """The place made shallower, so that its back is in front of skirting boards that homes draw into it.
-
-    boards: (N, 3) points of each in the world.
-    """
+    """The place made shallower, its back before skirting boards, points (N, 3) of each in the world."""
     back, low = float(place.low[2]), place.low.copy()
     for points in boards:
         local = place.local(points)
@@ -128,10 +119,7 @@ def before_boards(place: OldPlace, boards: Sequence[F64]) -> OldPlace:
 
 
 def at_wall(place: OldPlace, walls: Sequence[F64]) -> OldPlace:
-    """The place moved to the wall face at its back, where it was drawn a little before it or in it.
-
-    walls: (F, 3, 3) triangles of each wall in the world.
-    """
+    """The place moved to the wall face, among triangles (F, 3, 3), a little before or behind its back."""
     back, faces = float(place.low[2]), [np.zeros(0)]
     for corners in walls:
         local = place.local(corners.reshape(-1, 3)).reshape(-1, 3, 3)
@@ -164,10 +152,7 @@ def _back_of(local: F64, place: OldPlace) -> str:
 
 
 def group_of_item(item: Item, catalogue: Mapping[str, Piece]) -> str:
-    """The group of an item of the source by its catalogue id, else by its class; "" = unknown.
-
-    catalogue: by plain_id.
-    """
+    """Group of a source's item by its plain_id in the catalogue, else by its class; "" = unknown."""
     piece = catalogue.get(plain_id(item.source_class))
     if piece is not None and (piece.nyu40 == item.nyu40 or piece.group in HELD):
         return piece.group

@@ -1,7 +1,4 @@
-"""A disk cache of painted materials, for all homes and processes: painting takes a hundred times as long.
-
-Effects: reads and writes its folder. A hit equals a fresh painting, so results do not depend on it.
-"""
+"""A disk cache of painted materials, a hundred times as fast as painting and equal to it."""
 
 from __future__ import annotations
 
@@ -46,10 +43,7 @@ class _File(NamedTuple):
 
 
 class PaintedBank:
-    """Painted materials by what they are painted from.
-
-    folder: where they are kept, which several processes may share; None: in memory alone.
-    """
+    """Painted materials by key, in a folder that processes may share, or (None) in memory alone."""
 
     def __init__(self, folder: Path | None, most_bytes: int = MOST_BYTES) -> None:
         self._folder = folder
@@ -58,11 +52,7 @@ class PaintedBank:
         self._known: dict[str, Painting] = {}
 
     def painted(self, key: str, paint: Callable[[], Painted]) -> Painted:
-        """The cached material of a key; on a miss `paint` is called and its result stored.
-
-        key: everything that determines the pixels, besides the code. A damaged file is painted again; if
-        the folder is not writable, results are correct but slow.
-        """
+        """The cached material of a key (all inputs but code), painted if missing or damaged."""
         # Two threads that ask for one wait for each other, and for nothing else.
         with self._lock:
             painting = self._known.setdefault(key, Painting(lambda: self._kept(key, paint)))

@@ -1,7 +1,4 @@
-"""Materials and textures of a house during dressing, some of them painted in the background.
-
-Effects: a thread paints; each house has one, until close().
-"""
+"""Materials and textures of a house during dressing; a thread paints some of them until close()."""
 
 from __future__ import annotations
 
@@ -66,10 +63,7 @@ class PaintedMaterials(Sequence[Material]):
         return material
 
     def add(self, material: Material, textures: Iterable[Texture]) -> int:
-        """Index of a material, the same for equal ones, including finished painted ones.
-
-        textures: those of the material.
-        """
+        """Index of a material with its textures, the same for equal ones, finished painted ones too."""
         self._textures += ((t.id, t) for t in textures)
         if material not in self._number:
             self._number[material] = len(self._all)

@@ -60,11 +60,7 @@ _KINDS: Final = (ItemKind.OBJECT, ItemKind.LAMP, ItemKind.DOOR)
 
 
 def kind_of_part(material: Material, item: Item, group: str) -> PartKind:
-    """Material kind of an item's material. group: the catalogue's, "" if unknown.
-
-    Glass, mirrors, bulbs, pictures and screens are OTHER; so are wood and cloth of items that are
-    never made of them.
-    """
+    """Material kind of an item's material; OTHER for glass, screens, and what its group is never made of."""
     if material.kind is not MaterialKind.OPAQUE or item.kind not in _KINDS:
         return PartKind.OTHER
     if material.texture_id is not None or material.opacity < 1:

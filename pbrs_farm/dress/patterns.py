@@ -116,9 +116,8 @@ def _tinted(house: MutableHouse, pattern: Pattern) -> Painted:
 
 
 def photographed(house: MutableHouse, catalogue: Catalogue, pattern: Pattern) -> Pattern:
-    """The pattern, or a photograph of the catalogue in its place, drawn by its family and seed.
-
-    With n photographs that fit, one is shown with probability n / (n + 12).
+    """The pattern or, with probability n
+    (n + 12), one of n fitting photographs of the catalogue.
     """
     photograph = photograph_for(house, catalogue, pattern.family, pattern.seed)
     return replace(pattern, photograph=photograph) if photograph else pattern

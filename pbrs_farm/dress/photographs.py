@@ -46,11 +46,7 @@ _KEPT: Final = "photograph "
 
 
 def photograph_for(house: MutableHouse, catalogue: Catalogue, family: str, seed: int) -> str:
-    """The texture's id of a picture of the catalogue for a surface of that family; "" = draw it.
-
-    The more fitting pictures there are, the likelier one is taken: n of n + 12 times. Equal
-    arguments give the same one.
-    """
+    """Texture id of one of n fitting pictures of the catalogue, n of n + 12 times; else "" = draw it."""
     shown = _SHOWN.get(family)
     if shown is None:
         return ""

@@ -31,10 +31,7 @@ _FRENCH_M = 0.4  # a window whose sill is lower is walked through
 
 @dataclass(frozen=True, slots=True, eq=False)
 class FloorSpot:
-    """A place for a piece at a wall, with its plan area and the area in front of it.
-
-    From spot_at; RoomFloor checks whether it is allowed.
-    """
+    """A place for a piece at a wall, with its plan area and the area in front; RoomFloor checks it."""
 
     face: WallFace
     s: float  # of the piece's centre, along the face
@@ -44,11 +41,7 @@ class FloorSpot:
 
 
 def spot_at(face: WallFace, s: float, width: float, depth: float, before_m: float) -> FloorSpot:
-    """The place of a piece with its back at a wall face.
-
-    s: metres along the face, of the piece's centre. width, depth: of the piece. before_m: required
-    free floor in front. Its back keeps OUT_M from the wall, for the skirting board.
-    """
+    """The place of a piece, centred at s, OUT_M before a wall face, with before_m of floor in front; metres."""
 
     def area(z0: float, z1: float) -> BaseGeometry:
         ends = [(s - width / 2, z0), (s + width / 2, z0), (s + width / 2, z1), (s - width / 2, z1)]
@@ -82,10 +75,7 @@ class RoomFloor:
 
     @classmethod
     def of(cls, house: MutableHouse, space: HouseSpace, room: RoomSpace) -> RoomFloor | None:
-        """The room in its current state; None without a floor or walls.
-
-        space: of the same state of the house.
-        """
+        """The room in the current state of house and space; None without a floor or walls."""
         bitmap = floor_bitmap(space, room)
         if not bitmap.inside.any() or not room.faces:
             return None
@@ -117,10 +107,7 @@ class RoomFloor:
         )
 
     def allows(self, body: BaseGeometry, front: BaseGeometry) -> bool:
-        """True if a piece may be placed: on free floor, clear of doors, with every way kept open.
-
-        body, front: plan areas (x, z) of the piece and of the floor that it needs in front.
-        """
+        """True if body and front (plan areas) are on free floor, off doors, and every way stays open."""
         is_there = shapely.contains(self.free, body) and not shapely.intersects(self.kept, body)
         if not is_there or any(shapely.intersects(body, area) for area in self.fronts):
             return False
@@ -132,19 +119,13 @@ class RoomFloor:
         return self._keeps_ways(self._cells(body))
 
     def take(self, body: BaseGeometry, front: BaseGeometry) -> None:
-        """Occupy the place of a piece; not checked again.
-
-        body, front: as of allows.
-        """
+        """Occupy the place of a piece, its body and front, unchecked."""
         self.bodies.append(body)
         self.fronts.append(front)
         self.bitmap = with_body(self.bitmap, self._cells(body))
 
     def is_too_full(self, area_m2: float) -> bool:
-        """Whether area_m2 more of furniture would cover more than 58 % of the room's floor.
-
-        Ask it before a place is looked for, which costs more.
-        """
+        """True if area_m2 more of furniture would cover over 58 % of the floor; ask it first."""
         inside, covered = self.bitmap.inside, self.bitmap.occupied & self.bitmap.inside
         covered_m2 = float(covered.sum()) * CELL_M**2 + area_m2
         return covered_m2 > _MOST_COVERED * float(inside.sum()) * CELL_M**2

@@ -50,10 +50,7 @@ _CLOTHS: Final = read_toml(Path(__file__).with_name("cloths.toml"), dict[str, _C
 def weave_soft_things(
     house: MutableHouse, catalogue: Catalogue, style: Style, share: float
 ) -> None:
-    """Give a share of the soft parts in one plain colour threads, and some a print.
-
-    What has one colour in one room gets one look, so that sets stay sets.
-    """
+    """Give a share of plain soft parts threads, some a print, one look for a colour and room."""
     seats = {p.id for p in catalogue.of(*_SEATS)}
     for index, item in enumerate(house.items):
         if item.kind.is_structure:

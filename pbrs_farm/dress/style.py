@@ -75,10 +75,7 @@ class Metal:
 
 @dataclass(frozen=True, slots=True)
 class Style:
-    """One home's taste: what surfaces, furniture, textiles and pictures draw their colours from.
-
-    Colours are sRGB-encoded, 0..1. Draw one by style_for; room_style may give a room another one.
-    """
+    """One home's or room's taste: the sRGB colours, 0..1, of surfaces, furniture, textiles and pictures."""
 
     name: str
     palette: Palette  # wall, second wall, accent wall, large items, small items
@@ -187,10 +184,7 @@ def style_for(rng: np.random.Generator, name: str = "") -> Style:
 
 
 def room_style(style: Style, rng: np.random.Generator) -> Style:
-    """The style of one room: the home's, or in a fifth of the rooms another taste's.
-
-    The home's wood and metal stay, because doors and fittings are bought once.
-    """
+    """The home's style, or in a fifth of the rooms another taste with the home's wood and metal."""
     other_style = style_for(rng)
     if rng.random() >= OUTLIER_SHARE:
         return style
@@ -198,10 +192,7 @@ def room_style(style: Style, rng: np.random.Generator) -> Style:
 
 
 def shade(colour: Rgb, factor: float) -> Rgb:
-    """The colour darker (factor < 1: times factor) or lighter (> 1: towards white), sRGB-encoded.
-
-    factor 2 goes half the way to white.
-    """
+    """The colour darker (times factor < 1) or lighter (factor 2 goes half the way to white), sRGB-encoded."""
     if factor <= 1.0:
         r, g, b = (max(c * factor, 0.0) for c in colour)
     else:

@@ -101,10 +101,7 @@ def supports_of_item(
 def floor_support(
     scene: SceneTriangles, room: Room, *, border_m: float = _BORDER_M
 ) -> Support | None:
-    """The free part of a room's floor, as one support; None without a face at its floor_y.
-
-    Rugs and other items on the floor are obstacles. border_m: as of supports_of_item.
-    """
+    """The free part of a room's floor, without rugs and other items; None without a face there."""
     corners = np.insert(np.asarray(room.polygon, np.float64), 1, room.floor_y, axis=1)
     grid = PlanGrid.around(room.polygon, _turn_of_outline(corners), _FLOOR_CELL_M, border_m)
     off, kinds = np.array([0.0, _FLOOR_M, 0.0]), (ItemKind.FLOOR, ItemKind.GROUND)
@@ -126,10 +123,7 @@ def floor_support(
 
 
 def plan_turn(item: Item, points: F64) -> float:
-    """Angle about +y of the item's own axes: of its box, else of the least box around its plan.
-
-    points: (N, 3) its vertices, for where there is no box.
-    """
+    """Angle about +y of the item's box, else of the least box around its vertices (N, 3) in plan."""
     if item.box is not None:
         axes = item.box.axes
         return float(np.arctan2(-axes[2, 0], axes[0, 0]))
@@ -172,10 +166,7 @@ class FacesAround:
     solid: Bools  # (rows, columns) inside a wall
 
     def clearance(self, height: float) -> F64:
-        """(rows, columns) free metres above height, at most MOST_FREE_M.
-
-        The furniture's own faces at that height are the support, not obstacles.
-        """
+        """(rows, columns) free metres above height, to MOST_FREE_M, the support's own faces apart."""
         hits = self.hits
         # Every face above the support limits the free height of its cells.
         stands = hits.high > height + np.where(self.is_own, _LEVEL_M, -_NEAR_M)
@@ -311,11 +302,7 @@ def _shift_mask(mask: Bools, axis: int, by: int) -> Bools:
 
 
 def turned_to_front(support: Support, room: Room, *, has_front: bool) -> Support:
-    """The support with its grid turned by quarters, so that +z is the side it is used from.
-
-    That is the front of its furniture where it is known and open (has_front: its grid's +z); else
-    the open side with most room before it.
-    """
+    """The support with +z at its known, open front, else at the open side with most room before it."""
     quarter = _front_quarter(support, room, has_front)
     if quarter == 0:
         return support

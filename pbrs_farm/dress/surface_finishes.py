@@ -17,10 +17,7 @@ from pbrs_farm.dress.style import Metal, Rgb, Wood
 
 @dataclass(frozen=True, slots=True)
 class Finish:
-    """Paint or material of a part: wood if given, else metal, else paint.
-
-    paint: sRGB-encoded, 0..1. roughness: of paint; wood and metal have their own.
-    """
+    """Wood if given, else metal, else sRGB paint 0..1 with a roughness."""
 
     name: str
     paint: Rgb = (0.93, 0.925, 0.91)
@@ -36,10 +33,7 @@ _SHEEN = (0.4, 0.4, 0.4)
 
 
 def with_finish(house: MutableHouse, surface: Surface, finish: Finish, axes: F64) -> Surface:
-    """The surface with a finish; wood gets new texture coordinates.
-
-    axes: (3, 3), columns are the item's own axes, along which the grain of wood runs.
-    """
+    """The surface with a finish, the grain of wood along the item's axes (3, 3)."""
     if finish.wood is None:
         return replace(surface, material=number_of_finish(house, finish))
     veneer = pattern_material(house, grain_pattern(house, finish.wood))
@@ -62,10 +56,7 @@ def item_with_finish(house: MutableHouse, item: Item, finish: Finish) -> Item:
 
 
 def has_plain(house: MutableHouse, item: Item) -> bool:
-    """True if a finish would change any of the item's surfaces.
-
-    Glass, mirrors, bulbs and textured surfaces are never changed.
-    """
+    """True if a finish would change a surface: glass, mirrors, bulbs and textured ones never change."""
     return any(is_plain(house.materials[s.material]) for s in item.surfaces)
 
 
@@ -89,10 +80,7 @@ def part_of_surface(surface: Surface, faces: Bools) -> Surface:
 
 
 def number_of_finish(house: MutableHouse, finish: Finish) -> int:
-    """The number in house.materials of a finish as a plain material; it is added where it is new.
-
-    Wood counts as its mean colour: for grain use with_finish.
-    """
+    """Number in house.materials of a finish as a plain material, of wood its mean colour; added if new."""
     return house.material(material_of_finish(finish))
 
 

@@ -18,10 +18,7 @@ LIFT_M = 0.0001  # above the support, so that no faces coincide
 
 @dataclass(frozen=True, slots=True)
 class TopSpot:
-    """A place for an item on a worktop: its first row and column, and how many of each.
-
-    From Worktop.spots.
-    """
+    """A place for an item of Worktop.spots: its first row and column, and how many of each."""
 
     row: int
     column: int
@@ -94,10 +91,7 @@ class Worktop:
         return rows.astype(np.int32), columns.astype(np.int32), n
 
     def take(self, spot: TopSpot) -> None:
-        """Mark a spot as occupied up to the ceiling.
-
-        spot: of this worktop; whether it is free is not checked.
-        """
+        """Mark a spot, unchecked, as occupied up to the ceiling."""
         ahead = slice(spot.row, spot.row + spot.n_rows)
         self.clear[ahead, spot.column : spot.column + spot.n_columns] = 0.0
 
@@ -115,10 +109,7 @@ class Worktop:
         return True
 
     def free_height_around(self, at: F64, radius_m: float) -> float:
-        """Minimum free height above the cells within radius_m of a plan position (2,), metres.
-
-        Cells beside the support count too, up to its grid's border.
-        """
+        """Least free height, metres, of cells within radius_m of a plan position, border included."""
         column, _y, row = self.grid.local(np.array([at[0], 0.0, at[1]]))
         rows, columns = np.indices(self.grid.shape)
         reach = radius_m / self.grid.cell_m + 0.75  # a cell touches the circle up to its corner
@@ -126,10 +117,7 @@ class Worktop:
         return float(self.clear[near].min(initial=np.inf))
 
     def keep_free(self, zone: BaseGeometry) -> None:
-        """Reserve a plan area (x, z), such as a door's swing.
-
-        zone: may be empty, or outside the support.
-        """
+        """Reserve a plan area (x, z), maybe empty or outside, such as a door's swing."""
         plan = self.grid.centres()
         corners = plan[[0, 0, -1, -1], [0, -1, 0, -1]]
         if not zone.is_empty and shapely.box(*corners.min(0), *corners.max(0)).intersects(zone):

@@ -164,10 +164,7 @@ class _Thing:
 
 
 def slabs(triangles: F64, depth_m: float = 0.02) -> tuple[F64, ...]:
-    """Convex slabs (V, 3) behind the faces of triangles (F, 3, 3): of walls and floors.
-
-    Faces of one plane that make a convex outline are one slab, others one each.
-    """
+    """Convex slabs (V, 3) behind faces (F, 3, 3), one for the faces of a plane with a convex outline."""
     longest = lengths(triangles - np.roll(triangles, 1, axis=1)).max(1)
     triangles = triangles[2 * face_areas(triangles) > _SLIVER_M * longest]
     normals = unit_normals(triangles)
@@ -296,10 +293,7 @@ def flat_part(points: F64) -> F64:
 
 
 def convex_parts(triangles: F64, *, most: int = 24, threshold: float = 0.05) -> tuple[F64, ...]:
-    """Convex parts of triangles (F, 3, 3), (V, 3) vertices each; never none, and none beyond their hull.
-
-    most: parts. threshold: concavity that stays (CoACD). Raises MachineFailed without coacd.
-    """
+    """Convex parts (V, 3) of triangles, `most` at most, down to a concavity (CoACD); MachineFailed."""
     try:
         import coacd
     except ImportError:
@@ -342,12 +336,7 @@ def clamped_to_hull(points: F64, body: F64) -> F64:
 
 
 def hull_of(points: F64) -> F64 | None:
-    """The corners (V, 3) of the convex hull of points; None where they lie in a plane.
-
-    points: (N, 3) float64, finite. The corners are some of the points, unchanged; their order is
-    qhull's, so use `hull_faces` where the triangles are needed. Fewer than four points give None,
-    too.
-    """
+    """The corners (V, 3), in no useful order, of the convex hull of points (N, 3); None if flat."""
     try:
         return np.asarray(points[ConvexHull(points).vertices])
     except (QhullError, ValueError):
@@ -363,12 +352,7 @@ def hull_volume(points: F64) -> float:
 
 
 def hull_faces(points: F64) -> I64:
-    """(F, 3) triangles of the convex hull of points, looking outwards; none where they lie in a plane.
-
-    points: (N, 3) float64, finite; faces index into all of them, inner points are simply not named.
-    The order of the faces is qhull's. No error is raised for points without a volume: test the
-    length.
-    """
+    """(F, 3) outward triangles over all points of their convex hull, none if they lie in a plane."""
     try:
         hull = ConvexHull(points)
     except (QhullError, ValueError):
@@ -381,11 +365,7 @@ def hull_faces(points: F64) -> I64:
 
 
 def thickened(points: F64) -> F64:
-    """Axis-aligned box (8, 3) around points, a millimetre larger on every side.
-
-    points: (N, 3), metres. A tilted flat mesh becomes a thick box: suitable for physics engines that
-    need a volume, not for measurements.
-    """
+    """Box (8, 3) around points (N, 3), a millimetre larger on every side, for engines that need a volume."""
     low, high = points.min(0) - _FLAT_M, points.max(0) + _FLAT_M
     return np.array(
         [[x, y, z] for x in (low[0], high[0]) for y in (low[1], high[1]) for z in (low[2], high[2])]

@@ -61,20 +61,13 @@ def doorways(
 
 
 def door_line(middle: F64, way: F64, width: float) -> LineString:
-    """The line that a door closes, however wide it is: into the walls at both its sides.
-
-    middle, way: (2,) of the plan, way of length 1 along the door's width; metres.
-    """
+    """The line that a door about middle (2,) along way closes, into the walls at both its sides."""
     half = way * (width / 2 + _JOIN_M)
     return LineString([middle - half, middle + half])
 
 
 def parted_at_doorways(piece: Polygon, lines: Iterable[LineString]) -> list[Polygon]:
-    """A piece of ground, parted by the lines where they leave rooms on both sides; whole where none does.
-
-    What is too small for a room goes to its neighbour. Parts share the line between them: nothing of
-    the ground is lost.
-    """
+    """A piece of ground parted by lines with rooms on both sides; smaller rests go to a neighbour."""
     across = [line for line in lines if piece.intersects(line)]
     if not across:
         return [piece]
@@ -91,10 +84,7 @@ def parted_at_doorways(piece: Polygon, lines: Iterable[LineString]) -> list[Poly
 
 
 def ground_between(feet: Sequence[BaseGeometry], lines: Sequence[LineString]) -> list[Polygon]:
-    """The pieces of ground that walls enclose, closed at doorways, by their place.
-
-    feet: of the walls, metres; gaps of ends that miss each other are closed. lines: of doors, as door_line.
-    """
+    """Pieces of ground that walls (feet) enclose, small gaps and doorways (lines) closed."""
     joined = shapely.union_all(feet).buffer(_JOIN_M / 2, join_style="mitre")
     standing = shapely.union_all([joined.buffer(-_JOIN_M / 2, join_style="mitre"), *feet])
     ways = [*doorways(standing), *lines]

@@ -136,10 +136,7 @@ def random_turn(rng: np.random.Generator) -> F64:
 
 
 def mean_shadow_m2(corners: F64) -> float:
-    """Mean area of an item's silhouette along the three axes, square metres.
-
-    corners: (F, 3, 3). Approximates the mean visible area of a randomly oriented item.
-    """
+    """Mean area of an item's silhouette (faces (F, 3, 3)) along the three axes, square metres."""
     areas = []
     for axes in ((0, 1, 2), (1, 0, 2), (0, 2, 1)):
         turned = corners[..., axes]

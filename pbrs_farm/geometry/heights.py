@@ -1,8 +1,4 @@
-"""Heights of triangles straight below and above points; no effects.
-
-Heights are y in metres, plan places (x, z). A triangle's edge belongs to it; an upright triangle
-has no height.
-"""
+"""Heights (y) of triangles above and below plan places (x, z), metres, edges included; no effects."""
 
 from __future__ import annotations
 
@@ -19,10 +15,7 @@ _PAIRS: Final = 1_000_000  # maximum pairs of position and triangle per batch, t
 
 
 def highest_below(places: F64, triangles: F64, limit_y: float | F64 = np.inf) -> F64:
-    """(N,) y of the highest surface of triangles (F, 3, 3) at plan positions (N, 2); -inf if none.
-
-    limit_y: upper bound, (N,) or one for all; surfaces above it are ignored, at it included.
-    """
+    """(N,) y of the highest surface up to limit_y of triangles (F, 3, 3) at places (N, 2); -inf if none."""
     limit = np.broadcast_to(np.asarray(limit_y, np.float64), (len(places),))
     highest = np.full(len(places), -np.inf)
     triangles = _candidates_near(places, triangles)
@@ -35,10 +28,7 @@ def highest_below(places: F64, triangles: F64, limit_y: float | F64 = np.inf) ->
 
 
 def lowest_above(places: F64, triangles: F64, least_y: float | F64) -> F64:
-    """(N,) y of the lowest surface of triangles (F, 3, 3) at plan positions (N, 2); inf if none.
-
-    least_y: lower bound, (N,) or one for all; surfaces at or below it are ignored.
-    """
+    """(N,) y of the lowest surface above least_y of triangles (F, 3, 3) at places (N, 2); inf if none."""
     least = np.broadcast_to(np.asarray(least_y, np.float64), (len(places),))
     lowest = np.full(len(places), np.inf)
     triangles = _candidates_near(places, triangles)
@@ -51,10 +41,7 @@ def lowest_above(places: F64, triangles: F64, least_y: float | F64) -> F64:
 
 
 def heights_in(places: F64, triangles: F64, edge: float = _EDGE) -> F64:
-    """(N,) y of triangle k of (N, 3, 3) at plan place k of (N, 2); NaN beyond its edges.
-
-    edge: barycentric coordinates by which a place may lie beyond an edge.
-    """
+    """(N,) y of triangle k at place k; NaN beyond its edges by more than `edge` (barycentric)."""
     y, covers = _heights_at(places, triangles, edge)
     return np.where(covers, y, np.nan)
 

@@ -1,7 +1,4 @@
-"""A home at a point in time: animated parts are moved by their motions; no effects.
-
-Static geometry is shared between times: surfaces, and the triangle rows for ray casting.
-"""
+"""A home at a point in time, its parts moved by motions, static geometry shared; no effects."""
 
 from __future__ import annotations
 
@@ -29,10 +26,7 @@ from pbrs_farm.geometry.opened import box_around, moved_surface
 
 
 def moved_item(item: Item, matrix: Matrix4) -> Item:
-    """The item moved rigidly by a matrix (4, 4): surfaces, lights, box, pose and joints.
-
-    Its room and level stay: whoever moves it for good asks anew where it is.
-    """
+    """The item with all parts but room and level moved rigidly by a matrix (4, 4)."""
     box, pose = item.oriented_box, item.pose
     if pose is not None:
         pose = replace(
@@ -62,11 +56,7 @@ def _moved_light(light: LightPart, matrix: F64) -> LightPart:
 
 
 def matrices_at(item: Item, motions: Mapping[str, Motion], time_s: float) -> dict[str, Matrix4]:
-    """Rigid (4, 4) matrices by part, from its pose at rest to its pose at a time.
-
-    motions: of the item, by part; "" is the whole item. Parts without a motion are omitted, including
-    the body ("") if the item as a whole does not move.
-    """
+    """Rigid (4, 4) from rest to a time of the parts, "" the whole, that have motions."""
     whole = motions.get("")
     of_item = None if whole is None else whole.matrix_at(time_s)
     matrices: dict[str, Matrix4] = {} if of_item is None else {"": of_item}
@@ -80,10 +70,7 @@ def matrices_at(item: Item, motions: Mapping[str, Motion], time_s: float) -> dic
 
 
 def item_at_time(item: Item, motions: Mapping[str, Motion], time_s: float) -> Item:
-    """The item at a time, with box, joints, lights and pose updated.
-
-    motions: see `matrices_at`. The box includes opened parts.
-    """
+    """The item at a time (motions: as of `matrices_at`), its box around opened parts."""
     matrices = matrices_at(item, motions, time_s)
     joints = tuple(
         replace(j, value=motions[j.part].value_at(time_s)) if j.part in motions else j
@@ -120,10 +107,7 @@ def house_at(house: House, time_s: float) -> House:
 
 @dataclass(frozen=True)
 class MovingHouse:
-    """A house with motions and its triangles, evaluated at successive times.
-
-    Static triangles are collected once; each time costs only the moving ones.
-    """
+    """A house with motions and its triangles, static ones collected once, at successive times."""
 
     house: House
     geometry: Geometry  # of the house at rest
@@ -176,10 +160,7 @@ class MovingHouse:
         )
 
     def face_motions(self, from_s: float, to_s: float) -> tuple[I64, F64]:
-        """(F,) indices and (M, 4, 4) matrices: matrices[indices[f]] moves face f from one time to another.
-
-        Matrix 0 is the identity, for static faces.
-        """
+        """(F,) indices of (M, 4, 4) matrices, 0 the identity, that move faces between times."""
         of_item = motions_by_item(self.house)
         of_surface = np.zeros(1 + max(self.geometry.face_surface, default=-1), np.int64)
         matrices, row_of = [np.eye(4)], dict[tuple[int, str], int]()

@@ -37,11 +37,7 @@ def moved_surface(surface: Surface, matrix: Matrix4) -> Surface:
 
 
 def item_at(item: Item, part: str, value: float) -> Item:
-    """The item with one part at another joint value, in radians or metres from closed.
-
-    The box keeps its axes and includes the moved part. Raises KeyError if the part has no joint. Joint
-    limits are not enforced.
-    """
+    """The item with a part's joint at a value (radians, metres; unlimited), box around it; KeyError."""
     joint = joint_of(item, part)
     matrix = joint.motion(value)
     surfaces = tuple(moved_surface(s, matrix) if s.part == part else s for s in item.surfaces)
@@ -146,10 +142,7 @@ def _bounds_of_way(joint: Joint, corners: F64, target: float) -> tuple[F64, F64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class _Track:
-    """A part in the coordinates of its joint, in which it moves along one axis alone.
-
-    A hinge: (radius, height) in a grid, the angle as the way; a slide: the plane across, metres.
-    """
+    """A part in its joint's coordinates: (radius, height), angle of a hinge; the plane across a slide."""
 
     joint: Joint
     axes: F64  # (3, 3) columns: two across, the joint's

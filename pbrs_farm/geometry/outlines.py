@@ -71,10 +71,7 @@ def gathered(w: float, d: float, fold: float, deep: float) -> list[tuple[float, 
 def d_shape(
     w: float, d: float, *, back: float = 0.0, share: float = 0.6, r: float = 0.01, n: int = 16
 ) -> list[tuple[float, float]]:
-    """An outline straight at the back (z = back) and round at the front: basins, toilets, seats.
-
-    share: of its depth that the round front takes; r: radius of its two corners at the back.
-    """
+    """An outline straight at z = back, round for a share of its depth in front; r: of its back corners."""
     t = np.pi * np.arange(n + 1) / n
     end = back + d * (1 - share)
     front = [(float(-w / 2 * np.cos(a)), float(end + d * share * np.sin(a))) for a in t]

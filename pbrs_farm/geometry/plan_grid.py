@@ -36,43 +36,26 @@ class PlanGrid:
 
     @staticmethod
     def around(points: Points2, turn_rad: float, cell_m: float, border_m: float) -> PlanGrid:
-        """The grid that covers plan points (N, 2) and border_m around them.
-
-        points: world (x, z) in metres, at least one. turn_rad turns the grid's axes against the
-        world's, so that walls may run along its rows. The grid has a cell at least.
-        """
+        """The grid, turned by turn_rad, of at least one cell over plan points (N, 2) and border_m around."""
         local = points @ _plan_turn(turn_rad)
         low = local.min(0) - border_m
         columns, rows = np.maximum(np.ceil((local.max(0) + border_m - low) / cell_m), 1).astype(int)
         return PlanGrid(_plan_turn(turn_rad) @ low, turn_rad, cell_m, (int(rows), int(columns)))
 
     def cropped(self, cells: tuple[slice, ...]) -> PlanGrid:
-        """The grid of these rows and columns alone.
-
-        cells: slices of rows and of columns with whole numbers at both ends, as
-        scipy.ndimage.find_objects gives them; a slice without ends fails. Cells keep their places
-        in the world.
-        """
+        """The grid of these slices (both ends given) of rows and columns, in place."""
         rows, columns = cells
         shape = (rows.stop - rows.start, columns.stop - columns.start)
         return PlanGrid(self.plan_of(columns.start, rows.start), self.turn_rad, self.cell_m, shape)
 
     def local(self, points: F64) -> F64:
-        """(..., 3) world points as (column, height in metres, row), in cells from the corner.
-
-        The middle of cell (row r, column c) is at (c + 0.5, y, r + 0.5); points outside the grid
-        get numbers below 0 or above its shape.
-        """
+        """(..., 3) world points as (column, height in metres, row); a cell's middle is at halves."""
         moved = points - np.array([self.origin[0], 0.0, self.origin[1]])
         turned = moved @ rotation_y(self.turn_rad)
         return np.asarray(turned / [self.cell_m, 1.0, self.cell_m])
 
     def plan_of(self, column: ArrayLike, row: ArrayLike) -> F64:
-        """(..., 2) world (x, z) of places given in cells from the corner.
-
-        column and row are broadcast against each other; whole numbers are corners of cells, halves
-        their middles. The inverse of `local`, without the height.
-        """
+        """(..., 2) world (x, z) of columns and rows, broadcast: the inverse of `local`."""
         local = np.stack(np.broadcast_arrays(column, row), -1).astype(np.float64) * self.cell_m
         return np.asarray(self.origin + local @ _plan_turn(self.turn_rad).T)
 
@@ -140,11 +123,7 @@ def _cells_over(grid: PlanGrid, local: F64, *, touched: bool) -> tuple[Ints, Int
 
 
 def covered(grid: PlanGrid, corners: F64, *, touched: bool = False) -> Bools:
-    """(rows, columns) true where a triangle covers the cell's centre, or touches the cell.
-
-    corners: (T, 3, 3) world, metres; vertical triangles cover no centre. Cells outside the grid are
-    ignored. touched: also true if a triangle only touches the cell, so that thin shapes count.
-    """
+    """(rows, columns) true where a triangle (T, 3, 3) covers the cell's centre or, if touched, touches it."""
     mask = np.zeros(grid.shape, np.bool_)
     _triangle, row, column, _doubled = _cells_over(grid, grid.local(corners), touched=touched)
     mask[row, column] = True
@@ -152,11 +131,7 @@ def covered(grid: PlanGrid, corners: F64, *, touched: bool = False) -> Bools:
 
 
 def covered_by_each(grid: PlanGrid, groups: Sequence[F64]) -> Bools:
-    """(G, rows, columns) true where a triangle of each group (T, 3, 3) covers the cell's centre.
-
-    One pass over all groups, faster than calling `covered` for each. All masks are in memory at the
-    same time.
-    """
+    """(G, rows, columns) true where a triangle of each group covers the cell's centre, in one pass."""
     masks = np.zeros((len(groups), *grid.shape), np.bool_)
     if groups:
         group = np.repeat(np.arange(len(groups)), [len(g) for g in groups])
@@ -167,11 +142,7 @@ def covered_by_each(grid: PlanGrid, groups: Sequence[F64]) -> Bools:
 
 
 def top_heights(grid: PlanGrid, corners: F64) -> F64:
-    """(rows, columns) height of the highest triangle over each cell's middle; -inf = none.
-
-    corners: (T, 3, 3) world, metres. Heights are those of the triangles' planes in the middle of a
-    cell; a cell that no triangle covers there is -inf even if one touches it.
-    """
+    """(rows, columns) height of the highest triangle (T, 3, 3) at each cell's middle; -inf = none."""
     top = np.full(grid.shape, -np.inf)
     hits = cells_over(grid, corners, touched=False)
     np.maximum.at(top, (hits.row, hits.column), hits.high)

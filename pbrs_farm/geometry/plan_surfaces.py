@@ -13,10 +13,7 @@ from pbrs_farm.core.house import Room, Surface
 
 
 def signed_area(polygon: Points2) -> float:
-    """Signed area of a polygon (N, 2), positive if counter-clockwise with the second axis up.
-
-    polygon: without a repeated first corner. Square metres for metres. In plan the axes are (x, z).
-    """
+    """Area of a polygon (N, 2), positive if counter-clockwise with the second axis up."""
     x, z = polygon[:, 0], polygon[:, 1]
     return float(0.5 * np.sum(x * np.roll(z, -1) - np.roll(x, -1) * z))
 
@@ -33,11 +30,7 @@ def room_shape(room: Room) -> shapely.Geometry:
 
 
 def counter_clockwise(polygon: Points2) -> Points2:
-    """polygon (N, 2), reversed if it runs clockwise.
-
-    The same array, not a copy, where it runs so already. "Counter-clockwise" holds with the second
-    axis up: in plan (x, z), seen from above with z down the page, it looks clockwise.
-    """
+    """polygon (N, 2), reversed if it runs clockwise (with the second axis up)."""
     return polygon if signed_area(polygon) >= 0 else polygon[::-1].copy()
 
 
@@ -61,10 +54,7 @@ def triangulated(rings: Sequence[Points2]) -> tuple[Points2, I32]:
 def horizontal(
     name: str, polygons: Sequence[Sequence[Points2]], y: float, material: int, *, up: bool
 ) -> Surface:
-    """Polygons (each an outline and its holes, plan points) at height y, facing up or down.
-
-    uv = plan (x, -z) in metres for a floor, (x, z) for a ceiling, so that neither is mirrored.
-    """
+    """Polygons with holes at height y, facing up or down; uv: (x, -z) metres of floors, (x, z) of ceilings."""
     # Cut each polygon and number its corners after those before it.
     points: list[Points2] = []
     faces: list[I32] = []

@@ -95,10 +95,7 @@ def _spanned(rings: Sequence[Points2], points: Points2, heights: F64, cloth: I64
 def level_or_sloped(
     name: str, parts: Sequence[Sequence[Points2]], heights: Sequence[F64], material: int
 ) -> Surface:
-    """A ceiling over polygons (each an outline and its holes), facing down.
-
-    heights: of each polygon, y of all its corners in order; level where they are equal.
-    """
+    """A ceiling over polygons with holes, facing down, through each polygon's heights (y)."""
     all_heights = np.concatenate(list(heights))
     if np.ptp(all_heights) < _LEVEL_M:
         return horizontal(name, parts, float(all_heights[0]), material, up=False)

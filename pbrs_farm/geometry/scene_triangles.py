@@ -30,11 +30,7 @@ class SceneTriangles:
         self._of_faces: dict[int, tuple[F64, F64]] = {}
 
     def of_item(self, index: int) -> F64:
-        """(F, 3, 3) corners of the faces of items[index] that have finite corners, metres.
-
-        Computed on the first call and kept: do not write into it. (0, 3, 3) for an item without
-        faces. An IndexError says that the scene has no such item.
-        """
+        """(F, 3, 3) finite faces of items[index], metres; cached, do not write into it."""
         if index not in self._corners:
             self._corners[index] = item_triangles(self.items[index])
         return self._corners[index]
@@ -51,11 +47,7 @@ class SceneTriangles:
         return [int(i) for i in np.flatnonzero(meets)]
 
     def in_box(self, low: F64, high: F64) -> tuple[F64, I32]:
-        """(T, 3, 3) faces whose bounds meet the box low..high, and (T,) the item of each.
-
-        low, high: metres. Faces are whole, not cut at the box, and one whose bounds meet it may
-        pass by it. The owner is the item's index in `items`, int32.
-        """
+        """(T, 3, 3) whole faces whose bounds meet the box low..high, and (T,) their items."""
         parts, owners = [np.zeros((0, 3, 3))], [np.zeros(0, np.int32)]
         for index in self.items_in(low, high):
             corners = self.of_item(index)

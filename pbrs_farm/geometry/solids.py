@@ -27,22 +27,14 @@ _BOX_FACES = (_QUAD + 4 * np.arange(6, dtype=np.int32)[:, None, None]).reshape(-
 
 
 def boxes_surface(name: str, boxes: Sequence[tuple[Triple, Triple]], material: int) -> Surface:
-    """A surface of axis-aligned boxes, each given by its low and high corner in metres.
-
-    Overlapping boxes keep their inner faces, as in a sofa made of cushions. material: index into the
-    house's materials.
-    """
+    """A surface of axis-aligned boxes by low and high corner, metres, inner faces kept."""
     corners = np.asarray(boxes, np.float64).reshape(-1, 2, 3)
     quads = [box_quads((low + high) / 2, (high - low) / 2) for low, high in corners]
     return quads_surface(name, np.concatenate(quads), material)
 
 
 def quads_surface(name: str, quads: F64, material: int) -> Surface:
-    """A surface of planar quads, two triangles each.
-
-    quads: (N, 4, 3) metres, corners counter-clockwise seen from outside. uv: metres from corner 0, u along
-    the first edge. Vertices are not shared between quads.
-    """
+    """A surface of planar quads (N, 4, 3), counter-clockwise from outside, uv in metres from corner 0."""
     quads = np.asarray(quads, np.float64).reshape(-1, 4, 3)
     # Lay u along the first edge, v at right angles to it in the quad's plane.
     u = quads[:, 1] - quads[:, 0]
@@ -73,31 +65,19 @@ def _faces_of_quads(n: int) -> I32:
 
 
 def box_quads(centre: F64, half: F64, axes: F64 | None = None) -> F64:
-    """(6, 4, 3) quads of an oriented box; axes: (3, 3), columns are unit, right-handed.
-
-    centre, half: (3,) metres, half the length along each axis; axes: None for the world's. Corners
-    run so that quads look outwards as long as axes are right-handed; a mirrored frame turns them
-    inside out.
-    """
+    """(6, 4, 3) outward quads of a box; centre, half: (3,); axes: (3, 3), right-handed, or the world's."""
     axes = np.eye(3) if axes is None else axes
     corners = np.asarray(centre) + (_SIGNS * np.asarray(half)) @ axes.T
     return np.asarray(corners[_BOX_QUADS], np.float64)
 
 
 def box(name: str, centre: F64, half: F64, material: int, *, axes: F64 | None = None) -> Surface:
-    """A closed oriented box as a surface of 24 vertices, so that edges are sharp.
-
-    centre, half: (3,) middle and half extents in metres. axes: (3, 3), columns are the box's unit,
-    right-handed axes; the world's by default. uv in metres on each side.
-    """
+    """A closed box of 24 vertices, sharp edges, uv in metres; axes: (3, 3), right-handed, or the world's."""
     return quads_surface(name, box_quads(centre, half, axes), material)
 
 
 def lathe(name: str, profile: F64, centre: F64, material: int, *, n: int = 16) -> Surface:
-    """The (radius, height) profile (P, 2), bottom to top, turned about the vertical through centre.
-
-    Normals are smooth around the turn, not along the profile; closed if both ends are on the axis.
-    """
+    """The (radius, height) profile (P, 2), bottom to top, turned about the vertical, smooth around."""
     angles = 2 * np.pi * np.arange(n + 1) / n
     around = np.stack([np.cos(angles), np.zeros(n + 1), -np.sin(angles)], -1)
     # Close the ring exactly.
@@ -131,10 +111,7 @@ def lathe(name: str, profile: F64, centre: F64, material: int, *, n: int = 16) -
 
 
 def sphere(name: str, centre: F64, radius: float, material: int, *, n: int = 16) -> Surface:
-    """A closed sphere with smooth normals, n segments around; radius in metres.
-
-    Flat sides lie within the sphere: its volume is a little less than a true one's.
-    """
+    """A closed, inscribed sphere with smooth normals, n segments around; radius in metres."""
     angles = np.linspace(-np.pi / 2, np.pi / 2, n // 2 + 1)
     profile = radius * np.stack([np.cos(angles), np.sin(angles)], -1)
     profile[[0, -1], 0] = 0.0

@@ -24,20 +24,13 @@ _SPARSE = 32  # cubes for each point: with more, sorting the points is faster
 
 
 def item_triangles(item: Item) -> F64:
-    """(F, 3, 3) float64 corners of an item's triangles in the world, metres; empty for none.
-
-    Triangles with a corner that is not finite are left out.
-    """
+    """(F, 3, 3) float64 finite corners of an item's triangles in the world, metres."""
     parts = [triangle_corners(s.positions, s.faces) for s in item.surfaces if len(s.faces)]
     return finite_triangles(np.concatenate([np.zeros((0, 3, 3)), *parts]))
 
 
 def surface_points(corners: F64, spacing_m: float = SPACING_M, box: F64 | None = None) -> F64:
-    """(N, 3) points on triangles (F, 3, 3), at most one in each cube of half the spacing.
-
-    No place of a triangle is farther than about 0.7 spacing_m from a point. box: (2, 3) lowest and
-    highest corner; only points in it are given, the same as without it and much sooner.
-    """
+    """(N, 3) points, one at most per cube of half the spacing, in box (2, 3) if given."""
     if not len(corners):
         return np.zeros((0, 3))
     area = float(lengths(area_vectors(corners)).sum()) / 2

@@ -33,10 +33,7 @@ class Swept:
 def swept_by(
     surfaces: Sequence[Surface], joints: Sequence[Joint], axes: F64 | None = None
 ) -> list[Swept]:
-    """Swept volume of each part, in the frame of the surfaces; parts without faces are omitted.
-
-    axes: (3, 3) columns, the axes of each part's box; x, y, z by default.
-    """
+    """Volume that each part with faces sweeps, in the frame of surfaces; axes: (3, 3) of the box."""
     axes = np.eye(3) if axes is None else axes
     volumes = []
     for joint in joints:

@@ -1,7 +1,4 @@
-"""Estimate a job's cost before it runs: tasks, hours, storage; pure.
-
-Uses the constants of pbrs_farm/run/costs.csv, which distinguish an hour from a month.
-"""
+"""Estimate a job's cost before it runs, by pbrs_farm/run/costs.csv: an hour or a month; pure."""
 
 from __future__ import annotations
 
@@ -17,11 +14,7 @@ _CPUS_PER_SLOT: Final = 2
 
 
 def seconds_per_view(recipe: Recipe) -> float:
-    """Expected seconds of light for a view on one slot of two cores.
-
-    From samples per pixel and picture size only, at least 1 s. Ignores scene complexity, darkness and
-    GPUs: the farm measures its own rates once a job runs.
-    """
+    """Expected seconds (at least 1) of light for a view on a slot of two cores, by samples and size alone."""
     return max(1.0, measured()["light_cpu_s"] * megasamples(recipe) / _CPUS_PER_SLOT)
 
 

@@ -82,11 +82,7 @@ class Farm:
         self.rights = Rights(self.users, config.token)
 
     def acting_as(self, user: User, place: str) -> Farm:
-        """The same farm as this user sees it. place: where he sits, for the audit.
-
-        For a server that took the token from a request and asks for its user. Ledger, store and
-        registry are shared with this object; neither one's rights change the other's.
-        """
+        """The same farm as this user, at a place (for the audit), sees it; ledger, store, registry are shared."""
         farm = copy.copy(self)
         farm.rights = Rights(self.users, self.config.token, user, place)
         return farm
@@ -134,11 +130,7 @@ class Farm:
         return Submitted(spec.job_id, len(houses), was)
 
     def check_store(self) -> None:
-        """Raises BadInput where workers live and none of them works on this farm's store.
-
-        For the moment before a job is submitted: its tasks would otherwise wait for ever. Costs one
-        read of the workers, and of the store only where workers name theirs.
-        """
+        """BadInput if none of the live workers works on this farm's store, where tasks would wait for ever."""
         living = [w for w in self.registry.workers() if w.age_s <= ALIVE_S]
         theirs = {
             w.fields["store_id"]: w.fields["store"] for w in living if w.fields.get("store_id")
@@ -152,10 +144,7 @@ class Farm:
             )
 
     def check_plugins(self, marks: Collection[str]) -> list[str]:
-        """The live workers that lack a plugin of these marks, each with the missing ones.
-
-        Raises BadInput if there are live workers and none of them has all plugins.
-        """
+        """The live workers that lack a plugin of these marks; BadInput if none of them has all plugins."""
         living = [w for w in self.registry.workers() if w.age_s <= ALIVE_S]
         lacking = {
             w.name: sorted(set(marks) - set(w.fields.get("plugins", "").split("\n")))
@@ -187,10 +176,7 @@ class Farm:
         return view
 
     def adopt(self, job: str, progress: Callable[[str], None] = lambda _line: None) -> JobView:
-        """Let workers of this version go on with a job of another one.
-
-        What it stored and this version would make alike stays; the rest is made again.
-        """
+        """Let workers of this version go on with a job of another one, whose equal results stay."""
         from workers.job import work_version
 
         spec = self.spec(job)
@@ -202,11 +188,7 @@ class Farm:
         return self.recover(job, progress)
 
     def spec(self, job: str) -> JobSpec:
-        """The job's specification; BadInput if it is not in the store.
-
-        From the store, so also available for a job lost from the ledger; includes later changes by
-        `set_priority` and `limit`. BadInput, too, for an invalid job id.
-        """
+        """The job's specification from the store, later changes included; BadInput for an unknown or invalid id."""
         from pbrs_farm.core.checked_json import checked
         from workers.job import JobSpec
 
@@ -216,19 +198,11 @@ class Farm:
             raise BadInput(job, "", f"no such job in {self.store.url}") from None
 
     def jobs(self) -> list[JobView]:
-        """Every job in the ledger, oldest first.
-
-        A few reads per job. Jobs forgotten in the meantime are skipped; jobs only in the store are
-        `lost_jobs`.
-        """
+        """Every job in the ledger, oldest first; `lost_jobs` has those only in the store."""
         return [v for j in self.ledger.known_jobs() if (v := self.ledger.view(j)) is not None]
 
     def newest_job(self) -> str:
-        """The most recently submitted job; BadInput if there is none.
-
-        By time of entry in the ledger. If the ledger is empty but the store is not, the error suggests
-        recover.
-        """
+        """The last job entered in the ledger; BadInput (which may suggest recover) without one."""
         jobs = self.ledger.known_jobs()
         if not jobs:
             lost = self.lost_jobs()
@@ -237,19 +211,13 @@ class Farm:
         return jobs[-1]
 
     def lost_jobs(self) -> list[str]:
-        """Jobs that the store knows and an empty ledger does not; [] where it holds any job.
-
-        A listing of the store's jobs: seconds on a large one. Without a configured store [].
-        """
+        """Jobs that the store knows and an empty ledger does not; [] where it holds any job, or without store."""
         from workers.coordinator.recover import lost_jobs
 
         return lost_jobs(self.ledger, self.store) if self.config.store_url else []
 
     def view(self, job: str) -> JobView:
-        """The ledger's view of a job; BadInput for an unknown one.
-
-        A snapshot: call again for news. `status` is the same for people, with rates and workers.
-        """
+        """The ledger's snapshot of a job, BadInput for an unknown one; `status` is the same for people."""
         view = self.ledger.view(check_job_id(job))
         if view is None:
             hint = "`recover` rebuilds a job from storage"
@@ -302,19 +270,12 @@ class Farm:
         return view is not None and view.state == "done"
 
     def explain(self, job: str, text: str) -> list[dict[str, Any]]:
-        """State of a task, of all tasks of a house, or of one view (HOUSE/VIEW).
-
-        Includes what each is waiting for. Raises BadInput if the job has no such house.
-        """
+        """State of a task, of a house's tasks, or of a view (HOUSE/VIEW), with what each waits for; BadInput."""
         rows = explain_tasks(self.ledger, self.registry, self.view(job), text)
         return rows or self._explain_not_admitted(job, text.partition("/")[0])
 
     def finished_houses(self, job: str, besides: Collection[str] = ()) -> set[str]:
-        """The job's finished houses, except those in besides.
-
-        besides: ids already known to be finished, which are not queried. Reads the job's list of houses from
-        the store and a field of each from Redis: suitable for following a large job with pauses.
-        """
+        """The job's finished houses but those in besides, one field each: suits following a large job."""
         from workers.job import houses_from_lines
 
         entries = houses_from_lines(self.store.get(job_key(check_job_id(job), "houses.jsonl")))
@@ -375,11 +336,7 @@ class Farm:
         return sorted(kinds.values(), key=lambda k: (-k["n"], k["fingerprint"]))
 
     def retry(self, job: str, tasks: Sequence[str] = ()) -> list[str]:
-        """Give these tasks, or all failed ones, new attempts; returns the tasks that were reset.
-
-        Tasks that have not failed permanently, or do not exist, are skipped; BadInput for an invalid task
-        and for another user's job. A finished job runs again.
-        """
+        """Give these tasks, or all failed ones, new attempts; the reset ones. BadInput, also for another user's."""
         # The ledger forgets the failure, then storage does.
         self.rights.check_owner(job, self.view(job).user)
         chosen = list(tasks) or [task for task, _fault in self.ledger.faults(job)]
@@ -390,11 +347,7 @@ class Farm:
         return again
 
     def pause(self, job: str) -> str:
-        """Start nothing more; what runs, ends. The job's state afterwards.
-
-        Tasks that wait keep their places, `resume` goes on with them. BadInput for a job that the
-        ledger has not and for another user's, as in `resume`, `cancel` and `reduce`.
-        """
+        """Start nothing more; what runs, ends, what waits, waits for `resume`. The state; BadInput."""
         return self._steer(job, "pause", "by hand")
 
     def resume(self, job: str) -> str:
@@ -402,26 +355,15 @@ class Farm:
         return self._steer(job, "resume")
 
     def cancel(self, job: str) -> str:
-        """Stop a job permanently: running tasks are killed. Storage is kept, and a later submit reuses it.
-
-        A cancelled job cannot be resumed; a finished job stays finished. Submitting the same work again
-        renders only missing parts.
-        """
+        """Stop a job for good, running tasks too; storage stays, so that submitting again renders only the rest."""
         return self._steer(job, "cancel", "by hand")
 
     def reduce(self, job: str) -> str:
-        """Merge the existing results of a finished or running job; its report lists missing parts.
-
-        Only requests it: a worker merges when a slot is free. No effect on a cancelled job.
-        """
+        """Request a merge of a running or finished job's results; its report lists missing parts."""
         return self._steer(job, "reduce")
 
     def set_priority(self, job: str, priority: int) -> str:
-        """Dispatch the job by another priority, 0 first, from the coordinator's next turn; its state.
-
-        priority: 0 to 9. It orders the jobs of one user; between users shares decide. Running tasks
-        go on.
-        """
+        """Order a user's jobs by priorities 0 (first) to 9 from the next turn on; the job's state."""
         state = self._steer(job, "priority", str(priority))
         # A recovered job keeps it; steering alone may work without a store.
         if self.config.store_url:
@@ -449,11 +391,7 @@ class Farm:
         return state
 
     def drain(self, worker: str, *, undo: bool = False) -> None:
-        """Ask a worker to finish its tasks and leave; BadInput for an unknown worker.
-
-        undo: let it take work again, even if it left and is restarted under its name. Returns immediately:
-        see `workers` for its state. Requires an admin on a farm with users.
-        """
+        """Ask a worker to finish its tasks and leave (undo: also a restarted one); BadInput. Needs an admin."""
         self.rights.check_admin("drain")
         if not self.registry.drain(worker, undo=undo):
             offer = did_you_mean(worker, [w.name for w in self.registry.workers()])
@@ -461,11 +399,7 @@ class Farm:
         self.rights.note("drain", worker, "undone" if undo else "asked")
 
     def workers(self) -> list[dict[str, Any]]:
-        """Workers seen in the last hour, each with its state: alive, draining, drained, dead.
-
-        draining: finishes its tasks; drained: takes none until asked back; dead: no heartbeat, so its leases
-        expire.
-        """
+        """Workers of the last hour: alive, draining, drained (until asked back) or dead (no heartbeat)."""
         return [
             {**w.fields, "worker": w.name, "age_s": round(w.age_s, 1), "state": w.state}
             for w in self.registry.workers()
@@ -519,11 +453,7 @@ class Farm:
 def completed(
     houses: Sequence[HouseEntry], spec: JobSpec
 ) -> tuple[tuple[HouseEntry, ...], JobSpec]:
-    """(houses sorted by id, the spec with its number of houses and its job id).
-
-    The id is a digest of both, so that equal submissions are one job. Raises BadInput for no house, and
-    for a repeated one.
-    """
+    """(houses sorted by id, the spec with their number and a digest of both as id); BadInput for none or twice."""
     from workers.job import job_id
 
     if not houses:

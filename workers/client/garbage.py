@@ -38,11 +38,7 @@ class Garbage:
 
 
 def keep_from_text(text: str) -> float:
-    """Seconds of "30d", "12h", "2w". Raises BadInput for any other text.
-
-    Whole hours, days or weeks; no sums as "1d12h", and no bare numbers, so that nobody mistakes days for
-    seconds.
-    """
+    """Seconds of "30d", "12h", "2w", whole and with a unit; BadInput for any other text."""
     match = _KEEP.fullmatch(text)
     if match is None:
         raise BadInput("--keep", text, "not a time", hint="30d, 12h or 2w")
@@ -80,11 +76,7 @@ def garbage(farm: Farm, keep_s: float, now_s: float) -> list[Garbage]:
 
 
 def remove(farm: Farm, groups: Iterable[Garbage]) -> int:
-    """Delete objects, and forget cancelled jobs without any left; returns the number of objects.
-
-    groups: a recent result of `garbage`: ages are not checked again. Already missing objects are
-    counted too.
-    """
+    """Delete objects of a recent `garbage`, and forget cancelled jobs without any; the number, missing ones too."""
     n = 0
     for kind in groups:
         for key in kind.found:

@@ -14,10 +14,7 @@ if TYPE_CHECKING:
 
 
 def job_rows(farm: Farm) -> list[dict[str, Any]]:
-    """A row per job in the ledger, oldest first; a few reads each, whatever its size.
-
-    Plain JSON values; `Farm.status` says more of one job.
-    """
+    """A row of plain JSON values per job in the ledger, oldest first, by a few reads each."""
     slots = farm.registry.slots()
     return [job_row(view, slots) for view in farm.jobs()]
 

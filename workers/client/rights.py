@@ -18,10 +18,7 @@ from workers.ledger.user_table import UserTable
 
 
 class Rights:
-    """Rights of the caller.
-
-    token: identifies the user. acting: the user, if already known. place: address of the client.
-    """
+    """Rights of the caller: his token, the user if already known, the client's address."""
 
     def __init__(
         self, users: UserTable, token: Secret, acting: User | None = None, place: str = ""
@@ -46,11 +43,7 @@ class Rights:
         return user
 
     def check_owner(self, job: str, owner: str) -> None:
-        """Raises BadInput where the job is another user's; an admin may steer all.
-
-        owner: name of the job's user, "" for a job of the time before there were users, which only
-        an admin may steer then. On a farm without users everybody may.
-        """
+        """BadInput unless admin for another user's job, or one without owner; anybody without users."""
         user = self.who()
         if user is not None and not user.is_admin and user.name != owner:
             raise BadInput(
@@ -58,19 +51,13 @@ class Rights:
             )
 
     def check_admin(self, what: str) -> None:
-        """Raises BadInput where a user who is no admin asks.
-
-        what: the command, for the message. On a farm without users everybody may.
-        """
+        """BadInput, naming the command, unless an admin asks or the farm has no users."""
         user = self.who()
         if user is not None and not user.is_admin:
             raise BadInput(what, "", "only an admin may")
 
     def check_preempt(self) -> None:
-        """Raises BadInput where a user asks who may submit no urgent job.
-
-        An admin always may. On a farm without users everybody may.
-        """
+        """BadInput unless an admin, a user with that right, or anybody of a farm without users asks."""
         user = self.who()
         if user is not None and not (user.is_admin or user.may_preempt):
             hint = f"an admin's `pbrs-farm users limit {user.name} --may-preempt yes`"

@@ -25,10 +25,7 @@ _WAITING = {_TEXTS[STATES[name]] for name in ("LOADED", "READY", "QUEUED")}
 def explain_tasks(
     ledger: RedisLedger, registry: Registry, view: JobView, text: str
 ) -> list[dict[str, Any]]:
-    """A row per task that text names: a task, a house, or a view (HOUSE/VIEW).
-
-    Empty when the house is not in the ledger yet. Raises BadInput for a task or view there is not.
-    """
+    """A row per task of a task's, house's or view's name, () for an unknown house; BadInput."""
     house, _, rest = text.partition("/")
     states = ledger.unit_states(view.job_id, house)
     batches = ledger.batches(view.job_id, house)

@@ -17,11 +17,7 @@ _COUNTS: Final = {
 
 
 def status_text(status: Mapping[str, Any]) -> str:
-    """A few lines: the job, a row per stage, problems.
-
-    status: from `Farm.status`. Lines without information (failures, refusals, storage in order) are
-    omitted.
-    """
+    """A few lines: the job, a row per stage, problems if any; status: from `Farm.status`."""
     houses = status["houses"]
     lines = [
         f"job {status['job']}  {status['state']}"
@@ -60,10 +56,7 @@ def status_text(status: Mapping[str, Any]) -> str:
 
 
 def explanation_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    """One line per task, with its details below.
-
-    rows: from `Farm.explain`. Missing fields are omitted.
-    """
+    """One line per task of `Farm.explain`, with its known details below."""
     lines = []
     for row in rows:
         lines.append(f"{row['task']}: {row['state']}")
@@ -91,10 +84,7 @@ def explanation_text(rows: Sequence[Mapping[str, Any]]) -> str:
 
 
 def failures_text(kinds: Sequence[Mapping[str, Any]]) -> str:
-    """A kind of failure a paragraph, the most frequent first.
-
-    kinds: of `Farm.failures`. Five tasks of each are named, the command repeats one of them.
-    """
+    """A paragraph per kind of failure of `Farm.failures`, most frequent first, with up to five tasks."""
     if not kinds:
         return "no permanent failures"
     parts = []
@@ -108,11 +98,7 @@ def failures_text(kinds: Sequence[Mapping[str, Any]]) -> str:
 
 
 def workers_text(rows: Sequence[Mapping[str, Any]]) -> str:
-    """One line per worker with its state, and the number of live ones.
-
-    rows: with worker, state and age_s, and the fields that the worker reported; "?" for fields missing in
-    older versions.
-    """
+    """One line per worker with its state ("?" for unreported fields), and the number of live ones."""
     if not rows:
         return "no workers"
     wide = 2 + max(len("version"), *(len(row.get("version", "?")) for row in rows))
@@ -176,10 +162,7 @@ def changes_text(rows: Sequence[Mapping[str, str]]) -> str:
 
 
 def duration_text(seconds: float | None) -> str:
-    """ "42s", "7m", "3.1h", "2.5d"; "-" when not known.
-
-    119 s are "119s", 120 s "2.0m", two days "2.0d".
-    """
+    """ "119s", "2.0m", "3.1h", "2.5d"; "-" when not known."""
     if seconds is None:
         return "-"
     # Each unit up to some multiple of it: 119 s, but 2 m.

@@ -16,11 +16,7 @@ if TYPE_CHECKING:
 
 
 def limits_of(**given: Any) -> dict[str, Any]:
-    """The given fields of a User; BadInput for an invalid number.
-
-    None means not given and is dropped; 0 means no limit for a quota, and is invalid for a share. given:
-    fields of User. For `change_user`.
-    """
+    """The given fields of a User for `change_user`, without None; BadInput for an invalid number."""
     limits = {name: value for name, value in given.items() if value is not None}
     for name in ("max_slots", "slot_hours"):
         if not 0 <= limits.get(name, 0) < math.inf:
@@ -31,10 +27,7 @@ def limits_of(**given: Any) -> dict[str, Any]:
 
 
 def add_user(farm: Farm, name: str, limits: Mapping[str, Any]) -> str:
-    """Let somebody ask the farm for work; his token, which is kept nowhere.
-
-    The first one is an admin: from here on the farm asks who somebody is.
-    """
+    """Let somebody ask the farm for work (the first is an admin); his token, which is kept nowhere."""
     farm.rights.check_admin("users add")
     farm.users.restore(farm.store)
     users = farm.users.all()
@@ -48,11 +41,7 @@ def add_user(farm: Farm, name: str, limits: Mapping[str, Any]) -> str:
 
 
 def change_user(farm: Farm, name: str, limits: Mapping[str, Any]) -> None:
-    """Another share or quota; jobs that run follow it within seconds.
-
-    limits: field of User -> value, as `limits_of` gives them; others stay. BadInput for an unknown
-    user, for nothing to change, and where no admin would be left.
-    """
+    """Another share or quota (`limits_of`), also for running jobs; BadInput if no admin would be left."""
     farm.rights.check_admin("users limit")
     if not limits:
         hint = "--share, --max-slots, --slot-hours, --admin, --may-preempt"
@@ -65,11 +54,7 @@ def change_user(farm: Farm, name: str, limits: Mapping[str, Any]) -> None:
 
 
 def remove_user(farm: Farm, name: str) -> None:
-    """Invalidate a user's token; jobs go on. The last user may be removed too.
-
-    BadInput for an unknown user, and for the only admin while others remain. Without users the farm
-    requires no tokens.
-    """
+    """Invalidate a user's token; jobs go on. BadInput for the only admin of several users."""
     farm.rights.check_admin("users remove")
     users = farm.users.all()
     del users[known_user(users, name).name]
@@ -80,11 +65,7 @@ def remove_user(farm: Farm, name: str) -> None:
 
 
 def user_rows(farm: Farm) -> list[dict[str, Any]]:
-    """One row per user: share, quotas, current slots, and slot-hours of the last days.
-
-    Reads the view of every active job. "slot_hours_used" covers the last SPENT_DAYS days and finished
-    tasks; limits of 0 mean none.
-    """
+    """One row per user: share, quotas (0 = none), current slots, slot-hours of the last SPENT_DAYS."""
     users, spent = farm.users.all(), farm.users.spent_h()
     views = [farm.ledger.view(job) for job in farm.ledger.active_jobs()]
     return [

@@ -16,19 +16,12 @@ WORK_POOLS: Final = (GEOMETRY, GL, LIGHT, LIGHT_GPU)  # each has a queue; mergin
 
 
 def is_in_pool(view: JobView, pool: str) -> bool:
-    """Whether the job's tasks of that stage belong to the pool: its light is on GPUs, or is not.
-
-    Only light has two pools; for all others the answer is True for the pool of the stage's own
-    name.
-    """
+    """True if the job's tasks of that stage belong to the pool; light has one with and one without GPUs."""
     return pool_of(stage_of_pool(pool), gpu=view.uses_gpu) == pool
 
 
 def is_stopped(view: JobView, stage: str) -> bool:
-    """True if no task of the stage is sent because the user's slot-hours are spent.
-
-    Merges are never stopped: they are cheap and make finished work usable.
-    """
+    """True if a user's spent slot-hours stop a stage; merges, which are cheap, are never stopped."""
     return view.blocked_queues == (EVERYWHERE,) and stage in (GEOMETRY, GL, LIGHT)
 
 
@@ -50,11 +43,7 @@ def n_ready(view: JobView, pool: str) -> int:
 
 
 def n_queued_or_running(view: JobView, pool: str) -> int:
-    """Tasks in a pool whose message is on its way or that run.
-
-    0 for a job whose tasks of the stage belong to the other pool. `n_ready` counts those that wait
-    in the ledger.
-    """
+    """Tasks in a pool whose message is on its way or that run; `n_ready` counts the others."""
     stage = stage_of_pool(pool)
     if not is_in_pool(view, pool):
         return 0
@@ -62,10 +51,7 @@ def n_queued_or_running(view: JobView, pool: str) -> int:
 
 
 def n_slots(view: JobView, pool: str, state: str) -> int:
-    """Approximate slots that the job's tasks in a pool occupy (state RUNNING) or will (QUEUED).
-
-    A slot claims several short tasks of a house together, so there are fewer slots than tasks.
-    """
+    """About how many slots the job's tasks of a pool take (RUNNING) or will; a slot claims several."""
     stage = stage_of_pool(pool)
     n = view.counts.get(f"{stage}:{STATES[state]}", 0.0) if is_in_pool(view, pool) else 0.0
     if n <= 0 or stage == GEOMETRY:
@@ -76,9 +62,6 @@ def n_slots(view: JobView, pool: str, state: str) -> int:
 
 
 def n_claimed_together(view: JobView, stage: str) -> int:
-    """Number of tasks of a stage that a slot claims together: about TOGETHER_S of work, at least one.
-
-    From the mean of the job's own tasks; 1 before the first has ended. At most MOST_TOGETHER.
-    """
+    """Tasks of a stage that a slot claims together: 1 to MOST_TOGETHER, TOGETHER_S by the job's mean."""
     seconds = mean_s([view], stage)
     return max(1, min(MOST_TOGETHER, int(TOGETHER_S / seconds))) if seconds else 1

@@ -1,7 +1,4 @@
-"""Prometheus metrics of the farm, from O(1) reads of the ledger. Effects: a web server.
-
-No label names a house or a task, so that the number of series does not grow with a job.
-"""
+"""Prometheus metrics of the farm, from O(1) reads, in series that no job adds to. Effects: a web server."""
 
 from __future__ import annotations
 
@@ -43,11 +40,7 @@ class FarmCollector:
         self._table = UserTable(ledger)
 
     def collect(self) -> Iterator[Metric]:
-        """All metrics; only pbrs_up 0 when Redis does not answer.
-
-        Called by the Prometheus client at each scrape, in its thread: a few reads a job. Nothing is
-        cached.
-        """
+        """All metrics, by a few reads a job at each scrape; only pbrs_up 0 when Redis does not answer."""
         try:
             # All or nothing: half an answer would look like a farm that lost its jobs.
             metrics = [*self._farm(), *self._jobs()]
@@ -206,11 +199,7 @@ def _seconds(views: list[JobView]) -> Metric:
 
 
 def serve_metrics(config: FarmConfig, ledger: RedisLedger) -> Any:
-    """Serve /metrics on the configured port in a separate thread.
-
-    Returns prometheus_client's server and daemon thread. Raises OSError if the port is in use. There is no
-    authentication: keep the port internal.
-    """
+    """Serve /metrics, unprotected, on the configured port in a thread (server, thread); OSError."""
     registry = CollectorRegistry(auto_describe=False)
     registry.register(FarmCollector(ledger))
     return start_http_server(config.metrics_port, registry=registry)

@@ -23,11 +23,7 @@ class Rates:
     _rate: dict[str, dict[str, float]] = field(default_factory=dict)  # job -> stage -> 1/s
 
     def update(self, view: JobView, now_s: float) -> dict[str, float]:
-        """Stage -> tasks per second, from this look at the job and the ones before.
-
-        now_s: monotonic, seconds. An exponential mean over looks at any distance; empty after the
-        first look, since one count is no rate. A count that fell (a retry) counts as none done.
-        """
+        """Stage -> tasks per second, a mean over looks at now_s (monotonic); empty after the first look."""
         rates = self._rate.setdefault(view.job_id, {})
         done = {s: view.counts.get(f"done:{s}", 0.0) for s in STAGES}
         before = self._last.get(view.job_id)
@@ -63,11 +59,7 @@ class StageView:
 
 
 def views_per_hour(view: JobView) -> float:
-    """Views finished an hour: the rate of the last stage of batches times the views of a batch.
-
-    0 before the last stage has ended a batch. Taken from the ledger's rates, so it is as old as the
-    leader's last look.
-    """
+    """Views finished an hour: the last stage's rate at the leader's last look times a batch's views."""
     last = view.fields.get("stages", "").rpartition(",")[2]
     n_batches = view.counts.get(f"done:{last}", 0.0)
     per_batch = view.counts.get("views", 0.0) / n_batches if n_batches else 0.0
@@ -75,11 +67,7 @@ def views_per_hour(view: JobView) -> float:
 
 
 def stage_views(view: JobView, slots: Mapping[str, int]) -> list[StageView]:
-    """The stages of a job: counts, rate, and an ETA from the rate or, at first, from p50.
-
-    slots: stage -> maximum concurrent tasks of the workers, 0 without a worker. Stages that the job does not
-    have (light of a job without it) are omitted.
-    """
+    """The job's stages: counts, rate, and an ETA from the rate or, at first, p50; slots: by stage."""
     return [
         _stage_view(view, stage, slots.get(stage, 0)) for stage in STAGES if _has_stage(view, stage)
     ]
@@ -124,10 +112,7 @@ def _eta_s(left: int, rate: float, p50_s: float, n_slots: int) -> float | None:
 
 
 def expected_total(view: JobView, stage: str) -> int:
-    """Tasks of a stage in the whole job; batches of unopened houses are estimated by the mean so far.
-
-    0 without data. Abandoned houses have no remaining tasks.
-    """
+    """Tasks of a stage in the whole job, the mean so far for unopened houses; 0 without data."""
     n_houses = int(view.fields.get("n_houses", 0))
     if stage == JOB:
         return 1
@@ -146,11 +131,7 @@ def expected_total(view: JobView, stage: str) -> int:
 
 
 def durations(view: JobView, stage: str) -> dict[int, float]:
-    """Histogram of a stage's task durations: k -> tasks that took 2^(k-1) to 2^k seconds.
-
-    Sparse: powers without tasks are missing. k is -3 for anything shorter, so 1/8 s is the finest edge. For
-    `quantile_s`.
-    """
+    """Sparse histogram of a stage's durations: k (-3 at least) -> tasks of 2^(k-1) to 2^k seconds."""
     prefix = f"took:{stage}:"
     return {
         int(name.removeprefix(prefix)): n
@@ -160,10 +141,7 @@ def durations(view: JobView, stage: str) -> dict[int, float]:
 
 
 def mean_s(views: Iterable[JobView], stage: str) -> float:
-    """Mean seconds of the stage's tasks over all these jobs, 0 before the first has ended.
-
-    views: of several jobs, if one alone has too few tasks. Failed attempts are excluded.
-    """
+    """Mean seconds of the stage's finished tasks over all these jobs, 0 before the first."""
     seconds, n = 0.0, 0.0
     for view in views:
         seconds += view.counts.get(f"seconds:{stage}", 0.0)
@@ -172,10 +150,7 @@ def mean_s(views: Iterable[JobView], stage: str) -> float:
 
 
 def quantile_s(counts: Mapping[int, float], share: float) -> float:
-    """Seconds below which `share` of tasks ended, by a histogram over powers of two; 0 = none ended.
-
-    counts: of `durations`. The upper edge of the bin, so up to twice too much. share: in (0, 1].
-    """
+    """Seconds below which `share` of `durations` ended: a bin's upper edge, up to twice too much; 0 = none."""
     target = share * sum(counts.values())
     n_ended = 0.0
     for power in sorted(counts):

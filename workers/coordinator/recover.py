@@ -52,11 +52,7 @@ def rebuild(
 
 
 def lost_jobs(ledger: RedisLedger, store: Store) -> list[str]:
-    """Jobs that the store knows and an empty ledger does not; [] where it holds any job.
-
-    Sorted by id, which says nothing of their age. One request of Redis where it holds a job, else
-    also a listing of the store's jobs/.
-    """
+    """Jobs, by id, that the store knows and an empty ledger does not; [] where it holds any job."""
     if ledger.known_jobs():
         return []
     ends = [key.split("/") for key in store.list("jobs/") if key.endswith("/job.json")]
@@ -64,11 +60,7 @@ def lost_jobs(ledger: RedisLedger, store: Store) -> list[str]:
 
 
 def are_markers_current(store: Store, spec: JobSpec) -> bool:
-    """Whether a marker's name says that its step is done: one recipe, one version in this root.
-
-    Where it is False the content of each marker has to be read to know whether its step is to be
-    made again. Reads the description of every job that ever ran in this root.
-    """
+    """True if one recipe and version wrote this root, so that a marker's name says its step is done."""
     if store.head(keys.RECIPE_REPLACED) is not None:
         return False
     # Every job that ever ran here left its description.
@@ -78,11 +70,7 @@ def are_markers_current(store: Store, spec: JobSpec) -> bool:
 
 
 def done_steps(store: Store, houses: Sequence[str]) -> dict[str, frozenset[str]]:
-    """House -> names of its markers: a folder is listed once, elsewhere each house is asked for its own.
-
-    houses: ids. A house without markers is left out. Names are "<step>" or "<step>.<view>"; the
-    content of the markers is not read.
-    """
+    """House -> names ("<step>", "<step>.<view>") of its markers, by one listing of a folder, else one each."""
     if isinstance(store, LaidOutStore):
         with ThreadPoolExecutor(_THREADS) as pool:
             pairs = zip(houses, pool.map(partial(_names_of_house, store), houses), strict=True)

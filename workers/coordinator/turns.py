@@ -35,10 +35,7 @@ _NOBODY: Final = User("")
 
 
 class Loads:
-    """Load of each user, and the choice among several waiting users.
-
-    held: user -> messages in flight, or slots; updated by `serve`. share_of: a user's share, > 0.
-    """
+    """Load of each user by held messages or slots and share, and the choice among several waiting users."""
 
     def __init__(self, held: Counter[str], share_of: Callable[[str], float]) -> None:
         self.held = held
@@ -202,11 +199,7 @@ class MessageTurns:
         return quotas
 
     def charge(self, pool: str, job: str, n_sent: int) -> None:
-        """Count sent tasks of a job.
-
-        Call it with the number actually sent, which may be less than `split` gave: the rest is not charged. A job
-        without turns in the pool is ignored.
-        """
+        """Count sent tasks of a job, maybe fewer than `split` gave; no effect without turns there."""
         if job in self._passes.get(pool, {}):
             self._passes[pool][job] += n_sent * self._strides[pool][job]
 

@@ -28,11 +28,7 @@ Post = Callable[[dict[str, Any]], None]
 
 
 class Webhook:
-    """Posts each new end or pause of a job once, across leaders.
-
-    ledger: stores which events were posted. post: takes one JSON object; may raise OSError, and is tried five
-    times for one event.
-    """
+    """Posts each new end or pause of a job once, across leaders, by the ledger; five tries after OSError."""
 
     def __init__(self, ledger: Ledger, post: Post) -> None:
         self._ledger = ledger
@@ -40,11 +36,7 @@ class Webhook:
         self._tries: Counter[tuple[str, str]] = Counter()
 
     def look(self, views: list[JobView]) -> None:
-        """Post new events of these jobs.
-
-        Posts are recorded in the ledger, so that a new leader does not repeat them. A failed post is retried at
-        later calls, five times in all.
-        """
+        """Post new events of these jobs, and failed posts again, five times in all."""
         for view in views:
             notified = view.fields.get("notified", "")
             if view.outcome not in _POSTED_STATES:
@@ -66,10 +58,7 @@ class Webhook:
 
 
 def notice(view: JobView) -> dict[str, Any]:
-    """Event of a job; `text` is for chat programs.
-
-    Plain JSON values. The keys are a contract with receivers: add, never rename.
-    """
+    """Event of a job in JSON values (a contract: add keys, never rename); `text` is for chat programs."""
     counts = view.counts
     reason = view.fields.get("reason", "")
     row: dict[str, Any] = {
@@ -112,12 +101,7 @@ def poster(url: Secret) -> Post:
 def watch_jobs(
     webhook: Webhook, ledger: Ledger, look_at: Callable[[list[JobView]], None] = lambda _views: None
 ) -> Callable[[], None]:
-    """Function for the leader: check the newest jobs, in a separate thread.
-
-    look_at: called with the same jobs.
-
-    A slow URL delays no task; checks do not overlap.
-    """
+    """Function for the leader: look_at and webhook check jobs in a thread, which a slow URL may hold."""
     # Taken by begin, given back by the thread that it starts.
     busy = threading.Lock()
 

@@ -60,11 +60,7 @@ _RESEND_MOST: Final = 500
 
 
 def redis_client(config: FarmConfig) -> Any:
-    """A client that retries lost connections and passing refusals for a few seconds, but no timeout.
-
-    The caller decides what follows a timeout. Typed Any: redis-py types every answer as str, bytes,
-    None or an awaitable.
-    """
+    """A client that retries lost connections and passing refusals for seconds, but no timeout. Typed Any."""
     url = config.redis_url.reveal()
     scheme = url.partition(":")[0]
     kind = {"connection_class": BY_SCHEME[scheme]} if scheme in BY_SCHEME else {}
@@ -133,10 +129,7 @@ class RedisLedger:
     # The job
 
     def create(self, spec: JobSpec, store_id: str = "") -> str:
-        """Make the job unless it exists; its state before, "" when it was made now.
-
-        store_id: of the store that holds it; workers of another one refuse its tasks.
-        """
+        """Make the job, in the store of that id, unless it exists; its state before, "" if made now."""
         # The fields that scripts read; the rest of the spec stays in storage.
         rules = spec.rules
         fields: dict[str, object] = {
@@ -182,11 +175,7 @@ class RedisLedger:
                 pipe.execute()
 
     def load_houses(self, job: str, houses: Iterable[HouseState]) -> int:
-        """Enter houses with their progress in storage, in the job's order; returns the number of new ones.
-
-        Known houses are not changed, so an interrupted call may be repeated. For `recover`: fresh houses are added
-        with `add_houses`.
-        """
+        """Enter new houses with their progress in storage, in order, for `recover`; their number."""
         # Many calls in one round trip; each script is one house, and atomic.
         n_new = 0
         script, keys = self._scripts["load"], self._keys(job)
@@ -203,11 +192,7 @@ class RedisLedger:
         return n_new
 
     def open(self, job: str, priority: int) -> None:
-        """The job is loaded; the coordinator may dispatch it.
-
-        priority: 0 goes first. Called last of create, add_houses or load_houses, and open: until
-        then nothing of the job is sent. A coordinator that waits wakes up.
-        """
+        """The job is loaded and may be dispatched, 0 first: the last call of making a job."""
         with self.errors():
             pipe = self.client.pipeline(transaction=True)
             pipe.hset(f"{self._p(job)}job", "state", "running")
@@ -217,11 +202,7 @@ class RedisLedger:
             pipe.execute()
 
     def forget(self, job: str) -> None:
-        """Remove the job from the ledger; storage is not touched.
-
-        For an ended job: running tasks are not waited for. Scans all keys of the job, which is slow for a large one
-        but never blocks Redis.
-        """
+        """Remove an ended job from the ledger, by a slow scan that blocks nobody; storage stays."""
         with self.errors():
             self.client.zrem(f"{self._g}jobs", job)
             self.client.zrem(f"{self._g}known", job)
@@ -235,18 +216,11 @@ class RedisLedger:
                 self.client.unlink(*own_keys)
 
     def steer(self, job: str, what: str, reason: str = "") -> str:
-        """pause, resume, cancel, reduce, or priority, max_slots, budget_h, whose number is the reason.
-
-        The state afterwards, "" for an unknown job.
-        """
+        """pause, resume, cancel, reduce, or a field and its number; the state, "" if unknown."""
         return str(self._run("steer", job, what, reason))
 
     def retry(self, job: str, task: str) -> bool:
-        """Fresh attempts for a task that failed for good; False when it had not.
-
-        Its house and, where they had ended, its merges and the job open again. Tasks that a
-        quarantine of the house had cancelled are ready again, too.
-        """
+        """Fresh attempts for a task that failed for good (else False), its house, merges and job open again."""
         return bool(self._run("retry", job, task))
 
     # One task
@@ -271,17 +245,11 @@ class RedisLedger:
         return [Claim(verdict, detail, inputs, token) for verdict, detail, inputs in answers]
 
     def claim(self, job: str, task: str, *, token: str, recipe: str, direct: bool = False) -> Claim:
-        """claim_many of one task.
-
-        A slot prefers `claim_many`, which takes all tasks of a message in one round trip.
-        """
+        """claim_many of one task, which takes all tasks of a message in one round trip."""
         return self.claim_many(job, [task], token=token, recipe=recipe, direct=direct)[0]
 
     def heartbeat(self, job: str, tasks: Sequence[str], token: str) -> str:
-        """Keep the leases: ok, or of the first task lost (somebody else's by now) or cancelled.
-
-        preempted: they shall make room for an urgent job.
-        """
+        """Keep the leases: ok, lost, cancelled or preempted (for an urgent job), of the first that is not."""
         return str(self._run("heartbeat", job, token, self.config.lease_s, *tasks))
 
     def finish_many(
@@ -318,11 +286,7 @@ class RedisLedger:
     # The coordinator
 
     def lead(self, token: str) -> bool:
-        """Take or keep the lead for 15 seconds.
-
-        token: of this coordinator, the same at each call. False while another one holds the lead;
-        it falls free when its holder does not ask for it in time, or resigns.
-        """
+        """Take or keep the lead for 15 seconds by this coordinator's token; False if another has it."""
         return bool(self._run("lead", "", token, _LEAD_S))
 
     def resign(self, token: str) -> None:
@@ -332,11 +296,7 @@ class RedisLedger:
                 self.client.delete(f"{self._g}leader")
 
     def reap(self, token: str) -> int:
-        """End leases that ran out; how many, -1 when not leading.
-
-        Tasks whose slots have not sent a heartbeat count as lost and are tried elsewhere. Some
-        hundred at most in one call: call it again at the next turn.
-        """
+        """End, some hundred at most, leases without heartbeats; how many, -1 when not leading."""
         return int(self._run("reap", "", token, _REAP_MOST, *POOLS))
 
     def dispatch(
@@ -379,10 +339,7 @@ class RedisLedger:
         return int(self._run("preempt", job, token, *pairs))
 
     def set_rates(self, job: str, rates: Mapping[str, float]) -> None:
-        """Keep stage -> tasks per second for whoever asks.
-
-        Stages that are not named keep theirs. The leader measures them; `view` carries them.
-        """
+        """Keep stage -> tasks per second, measured by the leader, for `view`; unnamed stages keep theirs."""
         if rates:
             with self.errors():
                 self.client.hset(f"{self._p(job)}rate", mapping=dict(rates))
@@ -407,10 +364,7 @@ class RedisLedger:
     # Reading
 
     def view(self, job: str) -> JobView | None:
-        """The job's current state; a handful of O(1) reads for any size.
-
-        None for an unknown job. A value: it does not follow later changes.
-        """
+        """The job's current state by a handful of O(1) reads; None for an unknown job."""
         p = self._p(job)
         with self.errors():
             pipe = self.client.pipeline(transaction=False)
@@ -437,18 +391,12 @@ class RedisLedger:
             return list(self.client.zrange(f"{self._g}known", 0, -1))
 
     def unit_states(self, job: str, house: str) -> dict[str, str]:
-        """The house's hash: unit -> "<stage>:<letter>", and s (state), n, left, nf, i.
-
-        Empty for a house that the job has not, or that is not admitted yet. letter: of STATES.
-        """
+        """The house's hash: unit -> "<stage>:<letter>", and s (state), n, left, nf, i; or {}."""
         with self.errors():
             return dict(self.client.hgetall(f"{self._p(job)}h:{house}"))
 
     def finished(self, job: str, houses: Iterable[str]) -> list[str]:
-        """The finished ones of the houses.
-
-        One round trip per thousand houses. Quarantined houses are not included.
-        """
+        """The finished (not the quarantined) ones of the houses, a round trip per thousand."""
         done: list[str] = []
         for chunk in _in_chunks(houses):
             with self.errors():
@@ -465,11 +413,7 @@ class RedisLedger:
             return batches_from_text(self.client.hget(f"{self._p(job)}views", house) or "")
 
     def task_facts(self, job: str, task: str) -> dict[str, str]:
-        """Details of one task besides its state, as text.
-
-        Only known ones: "claim", "attempts", "tried" (workers, by commas), "fault" (JSON), "not_before" and "sent"
-        (Redis' clock, seconds).
-        """
+        """Known ones of "claim", "attempts", "tried", "fault" (JSON), "not_before", "sent" (Redis' s)."""
         p = self._p(job)
         with self.errors():
             pipe = self.client.pipeline(transaction=False)
@@ -481,29 +425,19 @@ class RedisLedger:
         return {n: str(v) for n, v in zip(names, values, strict=True) if v is not None}
 
     def lease_left_s(self, job: str, task: str, lease: str) -> float | None:
-        """Seconds until the lease of a running task ends, by the lease's name; None without one.
-
-        lease: light on GPUs has a separate name. Negative if it expired and was not reaped yet.
-        """
+        """Seconds (negative: to be reaped) until a running task's lease, by its name, ends; or None."""
         with self.errors():
             end = self.client.zscore(f"{self._g}lease:{lease}", f"{job}|{task}")
             return None if end is None else float(end) - self.now()
 
     def faults(self, job: str) -> Iterator[tuple[str, Fault]]:
-        """Every task that failed for good.
-
-        In no order; read as the caller iterates, so a fault that comes or goes meanwhile may be
-        missed or come twice.
-        """
+        """Every task that failed for good, in no order, read while iterating."""
         with self.errors():
             for task, text in self.client.hscan_iter(f"{self._p(job)}failed", count=_CHUNK):
                 yield task, fault_from_json(text)
 
     def holds(self, job: str) -> list[Hold]:
-        """Every task of the job that runs now, or waits in a slot for others it was claimed with.
-
-        One read of all claims of the job: as many as there are slots, at most a few more.
-        """
+        """Every task of the job that runs, or was claimed by a slot with a running one."""
         with self.errors():
             claims = self.client.hgetall(f"{self._p(job)}claims")
         return [hold_from_text(job, task, text) for task, text in claims.items()]
@@ -520,10 +454,7 @@ class RedisLedger:
     def wait_until_there(
         self, patience_s: float = 300.0, meanwhile: Callable[[], object] = lambda: None
     ) -> None:
-        """Return once Redis answers: a service may start before it. meanwhile: called now and then.
-
-        Raises LedgerUnavailable where it refuses these credentials, or does not answer in time.
-        """
+        """Return once Redis answers, calling meanwhile; LedgerUnavailable if it refuses or is late."""
         give_up = time.monotonic() + patience_s
         while True:
             meanwhile()
@@ -537,10 +468,7 @@ class RedisLedger:
                 time.sleep(_AWAY_S)
 
     def now(self) -> float:
-        """Redis' own clock, the only one that the farm uses, in seconds since 1970.
-
-        Machines' clocks may differ by minutes, so never subtract time.time() from it.
-        """
+        """Redis' own clock, seconds since 1970; machines' clocks differ, so never subtract time.time()."""
         seconds, micros = self.client.time()
         return float(seconds) + float(micros) / 1e6
 
@@ -556,11 +484,7 @@ class RedisLedger:
 
     @contextmanager
     def errors(self) -> Iterator[None]:
-        """Inside: whatever Redis refuses or fails at becomes LedgerUnavailable, one clear line.
-
-        Use it around every call of `client`. Other errors of Redis, as of a script, pass through:
-        they are bugs.
-        """
+        """Around calls of `client`: refusals and failures become LedgerUnavailable; bugs pass through."""
         try:
             yield
         # From the special to the general; the URL is shown without its password.

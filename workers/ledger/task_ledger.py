@@ -92,10 +92,7 @@ class Fault:
 
 
 def fault_from_json(text: str) -> Fault:
-    """The fault that JSON text holds; names it does not know are left out.
-
-    So a fault that a later version wrote can be read by an older one.
-    """
+    """The fault in JSON text, without names that only a later version knows."""
     names = {f.name for f in fields(Fault)}
     return Fault(**{name: value for name, value in json.loads(text).items() if name in names})
 
@@ -138,11 +135,7 @@ def hold_from_text(job: str, task: str, text: str) -> Hold:
 
 @dataclass(frozen=True, slots=True)
 class User:
-    """Somebody who may ask the farm for work, with what he may take of it.
-
-    Limits of 0 mean none. The share counts only against others who want slots at the same
-    time.
-    """
+    """Somebody who may ask the farm for work: a share, which counts while others wait, and limits, 0 = none."""
 
     name: str
     token_sha256: str = ""
@@ -354,10 +347,7 @@ class Users(Protocol):
 
 
 def batches_from_text(text: str) -> tuple[tuple[str, ...], ...]:
-    """ "a,b;c" -> (("a", "b"), ("c",)).
-
-    "" gives (). `text_from_batches` is the way back; names hold neither comma nor semicolon.
-    """
+    """ "a,b;c" -> (("a", "b"), ("c",)), "" -> (); `text_from_batches` is the inverse."""
     return tuple(tuple(batch.split(",")) for batch in text.split(";") if batch)
 
 

@@ -28,10 +28,7 @@ _MOST_CHANGES: Final = 1000  # maximum lines of the audit
 
 
 class UserTable:
-    """Implements workers.ledger.task_ledger.Users on the ledger's Redis.
-
-    A farm whose table is empty asks nobody who he is. Every method raises LedgerUnavailable.
-    """
+    """`Users` on the ledger's Redis; an empty table asks nobody. Methods raise LedgerUnavailable."""
 
     def __init__(self, ledger: RedisLedger) -> None:
         self._ledger = ledger
@@ -39,19 +36,13 @@ class UserTable:
         self._audit = f"{ledger.config.prefix}audit"
 
     def all(self) -> dict[str, User]:
-        """Every user by name; {} on a farm that asks nobody who he is.
-
-        One read of the whole table; names are in order. Raises LedgerUnavailable.
-        """
+        """Every user by name, in order, by one read; {} on a farm without users."""
         with self._ledger.errors():
             rows = self._ledger.client.hgetall(self._key)
         return {name: user_from_row(json.loads(row)) for name, row in sorted(rows.items())}
 
     def named_by(self, token: str) -> User | None:
-        """The user with a token; takes constant time for all invalid tokens.
-
-        None for an unknown token. Only digests of tokens are stored and compared.
-        """
+        """The user with a token, by its digest, in constant time; None for an unknown one."""
         digest, match = token_digest(token), None
         for user in self.all().values():
             if hmac.compare_digest(user.token_sha256, digest):
@@ -59,20 +50,13 @@ class UserTable:
         return match
 
     def save(self, users: Mapping[str, User], store: Store) -> None:
-        """Replace the farm's users: in the store first, then in Redis.
-
-        users: the complete table: missing users are removed. If two admins save at the same time, the last one wins.
-        """
+        """Replace all of the farm's users, in the store first; of two admins the last wins."""
         rows = {name: json.dumps(asdict(user)) for name, user in sorted(users.items())}
         store.put(KEY, f"{json.dumps([json.loads(r) for r in rows.values()], indent=1)}\n".encode())
         self._enter(rows)
 
     def restore(self, store: Store) -> bool:
-        """Load the store's users if Redis has none; returns whether there were any.
-
-        A table in Redis is never overwritten, even if the store's differs. Called at the start of a coordinator and
-        by `recover`.
-        """
+        """Load the store's users into a Redis without users, which is never overwritten; True if it had some."""
         if self.all():
             return False
         try:
@@ -92,10 +76,7 @@ class UserTable:
             pipe.execute()
 
     def spent_h(self) -> dict[str, float]:
-        """User -> slot-hours of the finished tasks in the last SPENT_DAYS days.
-
-        Days are in UTC. Users without any are missing. Raises LedgerUnavailable.
-        """
+        """User -> slot-hours, if any, of the tasks finished in the last SPENT_DAYS days (UTC)."""
         client = self._ledger.client
         with self._ledger.errors():
             today = int(self._ledger.now() // _DAY_S)
@@ -112,11 +93,7 @@ class UserTable:
         return seconds_of_user
 
     def note(self, row: Mapping[str, str]) -> None:
-        """Keep a line of who changed what.
-
-        Only the last _MOST_CHANGES lines are kept. row: flat, text to text; `changes` gives it
-        back.
-        """
+        """Keep a line, text to text, of who changed what; the last _MOST_CHANGES stay for `changes`."""
         with self._ledger.errors():
             pipe = self._ledger.client.pipeline(transaction=False)
             pipe.lpush(self._audit, json.dumps(dict(row)))
@@ -136,11 +113,7 @@ def user_from_row(row: Mapping[str, Any]) -> User:
 
 
 def new_user(name: str, **limits: Any) -> tuple[User, str]:
-    """A user and the token that names him, which is kept nowhere. Raises BadInput for a bad name.
-
-    limits: fields of User. The token is shown once to whoever asked; a lost one cannot be found
-    again, only replaced. Nothing is saved here.
-    """
+    """A user with limits, and the token that names him, shown once and kept nowhere; BadInput. Saves nothing."""
     if not _NAME.fullmatch(name):
         hint = "a letter or digit, then letters, digits, _ . -; 40 at most, no capitals"
         raise BadInput("users", repr(name[:60]), "is not a user name", hint=hint)
@@ -149,10 +122,7 @@ def new_user(name: str, **limits: Any) -> tuple[User, str]:
 
 
 def known_user(users: Mapping[str, User], name: str) -> User:
-    """The user with a name; BadInput for an unknown one.
-
-    users: from `UserTable.all`. The error suggests a similar name.
-    """
+    """The user with a name; BadInput, with a similar name, for an unknown one."""
     if name not in users:
         raise BadInput("users", repr(name[:60]), "no such user", hint=did_you_mean(name, users))
     return users[name]

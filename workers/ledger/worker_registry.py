@@ -1,7 +1,4 @@
-"""Registry of workers: registration, heartbeats, draining, and the storage breaker.
-
-Effects: Redis. The ledger's scripts read its keys (drain, cooling_until, breaker).
-"""
+"""Registry of workers (heartbeats, draining) and the storage breaker, in Redis for the ledger's scripts."""
 
 from __future__ import annotations
 
@@ -77,11 +74,7 @@ class Registry:
             return bool(was_drained)
 
     def leave(self) -> None:
-        """Remove this worker from the registry.
-
-        Its tasks must have ended before: they are not handed back here. A worker that dies is detected by its
-        missing heartbeat instead.
-        """
+        """Remove this worker, whose tasks have ended, from the registry."""
         config, client = self._ledger.config, self._ledger.client
         with self._ledger.errors():
             for name in ("workers", *(f"workers:{s}" for q in QUEUES for s in stages_of_queue(q))):
@@ -89,11 +82,7 @@ class Registry:
             client.delete(f"{self._g}worker:{config.worker}")
 
     def drain(self, worker: str, *, undo: bool = False) -> bool:
-        """Ask a worker to finish its tasks and leave; False for an unknown worker.
-
-        undo: withdraw the request. It applies to the worker's name for some time, so a restarted worker does not
-        take work either.
-        """
+        """Ask a worker, even after a restart, to finish and leave (undo: no more); False for an unknown one."""
         client, drained = self._ledger.client, self._drained(worker)
         with self._ledger.errors():
             is_there = client.zscore(f"{self._g}workers", worker) is not None
@@ -117,20 +106,13 @@ class Registry:
         return f"{self._g}drained:{worker}"
 
     def note_rejection(self, reason: str) -> None:
-        """This worker rejected a task of another version; `workers` and `status` show it.
-
-        reason: a line that names the job; a later one replaces it.
-        """
+        """Show in `workers` and `status` that this worker rejected a job of another version."""
         with self._ledger.errors():
             key = f"{self._g}worker:{self._ledger.config.worker}"
             self._ledger.client.hset(key, mapping={"refuses": reason})
 
     def workers(self) -> list[WorkerView]:
-        """Every worker seen in the last hour, by name.
-
-        With dead ones: `age_s` says when each was seen last, by Redis' clock. Those not seen for an
-        hour are forgotten.
-        """
+        """Every worker, dead ones too, seen in the last hour, by name; `age_s` is by Redis' clock."""
         client = self._ledger.client
         with self._ledger.errors():
             now = self._ledger.now()
@@ -150,11 +132,7 @@ class Registry:
         )
 
     def slots(self) -> dict[str, int]:
-        """Stage -> maximum concurrent tasks of the workers seen in the last ALIVE_S seconds.
-
-        Stages without a worker are missing. Slots for several stages count for each, so the sum is more than the
-        farm has.
-        """
+        """Stage -> maximum concurrent tasks of live workers, a slot counted for each of its stages."""
         # A worker's slots serve every stage of every queue it takes.
         slots: dict[str, int] = {}
         for worker in self.workers():
@@ -165,19 +143,13 @@ class Registry:
         return slots
 
     def open_breaker(self, reason: str) -> None:
-        """Storage is unhealthy: stop claims and messages until the breaker closes automatically.
-
-        reason: cut to 300 characters. Another call restarts the period.
-        """
+        """Storage is unhealthy: stop claims and messages for a period; reason: cut to 300 characters."""
         with self._ledger.errors():
             self._ledger.client.set(
                 f"{self._g}breaker", reason[:300], ex=self._ledger.config.breaker_s
             )
 
     def breaker(self) -> str:
-        """Why nothing is claimed, "" while storage is healthy.
-
-        Coordinators and slots ask before they send or claim; commands show it.
-        """
+        """Why nothing is claimed or sent, "" while storage is healthy."""
         with self._ledger.errors():
             return str(self._ledger.client.get(f"{self._g}breaker") or "")

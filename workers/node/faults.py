@@ -27,11 +27,7 @@ _PATHS: Final = re.compile(r"(/[\w.\-+]+)+/?")
 
 
 def class_of(error: BaseException) -> FaultClass:
-    """data: the input's fault, no other try. storage: nobody's, not counted. Else: try again.
-
-    By the error's type alone. "machine" and "resource" count against the worker, too; "storage" is
-    nobody's and costs no attempt.
-    """
+    """By the error's type: data (no other try), storage (uncounted), machine, resource (the worker's) ..."""
     # In order: nobody's fault, the input's, the machine's, ours.
     if isinstance(error, StoreRefused | Transient):
         return "storage"
@@ -45,11 +41,7 @@ def class_of(error: BaseException) -> FaultClass:
 
 
 def fingerprint(error: BaseException) -> str:
-    """Identifier of similar faults: type, place in our code, and the message without its numbers.
-
-    For grouping, so it is equal on all machines and library versions: the innermost frame of this package
-    names the place, without a line number.
-    """
+    """Identifier of similar faults on all machines: type, innermost place in our code, text without numbers."""
     # The innermost frame in our own code; library frames differ by version.
     place = ""
     for frame in traceback.extract_tb(error.__traceback__):
@@ -59,19 +51,12 @@ def fingerprint(error: BaseException) -> str:
 
 
 def without_numbers(text: str) -> str:
-    """text with numbers, ids and paths replaced, at most 160 characters.
-
-    White space becomes single blanks first. Two messages about different houses become equal.
-    """
+    """text on one line with numbers, ids and paths replaced, at most 160 characters."""
     return _NUMBERS.sub("#", _PATHS.sub("PATH", " ".join(text.split())))[:160]
 
 
 def one_line(error: BaseException) -> str:
-    """The error as a line for people, at most 500 characters.
-
-    The type's name goes before it, except for errors whose texts are whole sentences for people
-    (BadInput, StoreFailed).
-    """
+    """The error, after its type unless it is a sentence for people, in at most 500 characters."""
     text = " ".join(str(error).split()) or "no message"
     name = "" if isinstance(error, BadInput | StoreFailed) else f"{type(error).__name__}: "
     return f"{name}{text}"[:500]

@@ -1,7 +1,4 @@
-"""The farm's real runner: maps tasks to the steps of run/steps.py, as in a local run.
-
-Effects: those of the steps, and a scratch file for a house's source. Markers record finished steps.
-"""
+"""The farm's real runner: tasks as steps of run/steps.py, as in a local run, with a scratch file for a source."""
 
 from __future__ import annotations
 
@@ -48,11 +45,7 @@ _LIGHT_STEPS: Final = ("light", "develop")  # of the stage light
 
 
 def runner(config: FarmConfig, on_waiting: OnText) -> HouseRunner:
-    """The runner of a worker or of `recover`.
-
-    on_waiting: called with a reason while the store does not answer, for up to `storage_patience_s`
-    seconds; then the store's error is raised. Each slot takes its share of the machine's cores.
-    """
+    """The runner of a worker with its share of the cores; on_waiting: called while the store is away."""
     store = store_from_url(config.store_url, config.store)
 
     def with_patience(inner: Store) -> Store:
@@ -118,11 +111,7 @@ class HouseRunner:
         return Result(n_views=len(request.views), left_out=left_out)
 
     def survey(self, spec: JobSpec, house: str, done: frozenset[str]) -> Survey:
-        """Progress of a house by its markers' names: see workers.runner.Survey.
-
-        done: names of the house's markers, from `done_steps`. Reads the cameras of the house from the store once
-        its geometry is done.
-        """
+        """Progress of a house by its markers' names (`done_steps`) and its cameras, if there are some."""
         # Without its cameras nobody knows the views of the house.
         if not done.issuperset(steps_before_views(spec, house)):
             return Survey()
@@ -200,10 +189,7 @@ class HouseRunner:
         step: str,
         view: str,
     ) -> None:
-        """A step of a view; where there is no OpenGL, its pictures are left out, if there are others.
-
-        As a run on one machine does. Every further view would find the same: it is not tried again.
-        """
+        """A step of a view; OpenGL's pictures, if others are wanted, are left out where it is missing."""
         may_lack = step in plan.OPENGL_STEPS and plan.has_light(want_of(spec))
         if may_lack and self._lacks_opengl:
             return
@@ -285,18 +271,12 @@ def steps_before_views(spec: JobSpec, house: str) -> tuple[str, ...]:
 
 
 def batch_stages(want: Wanted) -> tuple[str, ...]:
-    """The stages a batch of views goes through: light only when a mode needs it.
-
-    In order; the stage gl always comes first and makes labels and OpenGL pictures.
-    """
+    """The stages a batch of views goes through, in order: gl, with labels, and light if a mode needs it."""
     return (GL, LIGHT) if "light" in view_steps(want) else (GL,)
 
 
 def steps_of_stage(spec: JobSpec, stage: str) -> tuple[str, ...]:
-    """The steps of a view that one stage does; the last stage also writes view.json.
-
-    For gl all but the light's steps, for light these. stage: one of these two.
-    """
+    """The steps of a view that a stage (gl or light) does; the last stage also writes view.json."""
     steps = view_steps(want_of(spec))
     last = stage == spec.batch_stages[-1]
     return tuple(

@@ -1,7 +1,4 @@
-"""House -> shard -> job: merge manifests upward, and report missing parts.
-
-Effects: the store's. Every object is rebuilt from those below it, so merging is idempotent.
-"""
+"""House -> shard -> job: merge manifests upward, always anew from below, and report missing parts."""
 
 from __future__ import annotations
 
@@ -23,20 +20,13 @@ from workers.runner import OnText
 
 
 def house_ids(store: Store, spec: JobSpec) -> list[str]:
-    """The job's houses in its order.
-
-    Read from the store on each call; a house's place in the list decides its shard.
-    """
+    """The job's houses in the order, read from the store, that decides their shards."""
     data = store.get(job_key(spec.job_id, "houses.jsonl"))
     return [house.house_id for house in houses_from_lines(data)]
 
 
 def merge_shard(store: Store, spec: JobSpec, shard: int, on_step: OnText) -> None:
-    """Write the manifests of a shard's houses as one; houses without one are left out.
-
-    shard: from 0; houses of a shard lie together in the job's order. Writes one object and may be
-    repeated: the same manifests give the same bytes. on_step: called before each house.
-    """
+    """Write the existing manifests of a shard's houses as one; shards count from 0; on_step: called per house."""
     # Read the shard's slice of the job's order.
     size = spec.rules.shard_size
     parts = []

@@ -17,11 +17,7 @@ HANDLER = f"{__name__}:make_handler"
 
 
 def make_handler(send: Send) -> Handler:
-    """The handler of the runner that this machine's configuration names.
-
-    Runs in the render process, not in the slot: it reads the environment and loads what the runner
-    imports. send: the way back to the slot. The handler takes a TaskRequest as a line of JSON.
-    """
+    """The handler, in the render process, of the configured runner: takes a TaskRequest as JSON."""
 
     # The supervisor of this process stops its clocks, the slot opens the breaker.
     def on_waiting(reason: str) -> None:

@@ -60,11 +60,7 @@ class Orders:
 
 
 def command(config: FarmConfig) -> list[str]:
-    """The Celery worker's command line; no secret is on it.
-
-    For exec or subprocess without a shell. Redis and the store come from the environment;
-    concurrency is the number of slots.
-    """
+    """The Celery worker's command line, a process per slot; secrets and URLs stay in the environment."""
     return [
         sys.executable,
         "-m",
@@ -87,11 +83,7 @@ def command(config: FarmConfig) -> list[str]:
 
 
 def check_machine(config: FarmConfig) -> None:
-    """Check a worker's requirements: Redis and space on scratch. Raises PbrsError.
-
-    Waits for Redis indefinitely and touches the liveness file in the meantime. LLVM and OpenGL are not tested
-    here: the render process reports them.
-    """
+    """Wait, alive, for Redis, and check the space on scratch, not LLVM and OpenGL. PbrsError."""
     RedisLedger(config).wait_until_there(meanwhile=lambda: touch(config.heartbeat_file))
     if not config.store_url:
         raise MachineFailed("no store", hint="PBRS_STORE=file:///folder or s3://bucket/prefix")
@@ -103,11 +95,7 @@ def check_machine(config: FarmConfig) -> None:
 
 
 def sweep(config: FarmConfig) -> None:
-    """Remove what an earlier life of this worker left on scratch.
-
-    Only files that carry this worker's name, and folders of processes that do not run any more:
-    several workers may share a scratch folder. Call it before the worker starts.
-    """
+    """Remove this worker's own files, and folders of ended processes, from scratch before it starts."""
     config.preemption_file.unlink(missing_ok=True)
     config.heartbeat_file.unlink(missing_ok=True)
     config.leaving_file.unlink(missing_ok=True)
@@ -195,11 +183,7 @@ class Idleness:
 
 
 def wait_while_drained(config: FarmConfig, orders: Orders) -> bool:
-    """Take no work while this worker is drained; False when a signal asks it to end meanwhile.
-
-    A container that ends is started again by Compose or Kubernetes under the same name: it stays,
-    seen as drained, until `drain --undo`.
-    """
+    """Stay without work while drained, so that nobody restarts it; False on a signal to end."""
     registry, due, is_logged = Registry(RedisLedger(config)), 0.0, False
     while orders.leave_at is None:
         if time.monotonic() >= due:

@@ -88,11 +88,7 @@ _TRANSPORT: Final[dict[str, Any]] = {
 
 
 def make_app(config: FarmConfig) -> Celery:
-    """A Celery application for this farm.
-
-    It is not made Celery's current app, so several may live in one process, as in tests. No
-    connection is opened here.
-    """
+    """A Celery application for this farm, unconnected and not Celery's current one."""
     from workers.node.heartbeat import Heartbeat
 
     url = config.redis_url.reveal()

@@ -28,8 +28,5 @@ def _make_ready(**_: object) -> None:
 
 @app.task(name=RUN)  # type: ignore[untyped-decorator]
 def run(job: str, task: str, recipe: str) -> None:
-    """Claim the tasks, run them in the render process, report to the ledger.
-
-    task: HOUSE/UNIT/STAGE, or several units of them: HOUSE/UNIT,UNIT/STAGE.
-    """
+    """Claim the tasks HOUSE/UNIT[,UNIT]/STAGE, run them in the render process, report to the ledger."""
     current_slot().run_tasks(check_job_id(job), tasks_from_group(task), recipe)

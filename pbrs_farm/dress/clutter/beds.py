@@ -54,11 +54,7 @@ class Lying:
 
 
 def dress_bed(placing: Placing, scene: SceneTriangles, index: int) -> int:
-    """Put pillows, and now and then a cushion and a blanket, on items[index]; how many.
-
-    0, with its reason counted, for a bed without a place to lie or smaller than 0.6 x 1.2 m.
-    Pillows that the source has stay. Its random numbers come from the placing's generator.
-    """
+    """Put pillows and maybe a cushion and a blanket on items[index]; how many, 0 (counted) if too small."""
     bed = lying_place(scene, index, placing.room)
     if bed is None or bed.width < 0.6 or bed.length < 1.2:
         placing.refuse("no place to lie found")
@@ -125,11 +121,7 @@ def _drop_on(placing: Placing, scene: SceneTriangles, corners: F64) -> None:
 
 
 def lying_place(scene: SceneTriangles, index: int, room: Room) -> Lying | None:
-    """The mattress of a bed: the height that most of it has, between head and foot boards.
-
-    Rows run from head to foot: the head is the higher end, of equal ones that at a wall. None for
-    an item without triangles, without a level part, or with too little air over it.
-    """
+    """The mattress of a bed, rows from its higher (or wall) end, its head; None without a level, free part."""
     corners = scene.of_item(index)
     points = corners.reshape(-1, 3)
     if not len(points):
@@ -208,10 +200,7 @@ def lay_down(
     turn_rad: float,
     level: float,
 ) -> bool:
-    """Lay a soft item at a plan position (2,) on items[index]; False if the place is occupied.
-
-    Its underside is flattened: no point is below the support.
-    """
+    """Lay a soft item at a plan position (2,) on items[index], flat below; False if occupied."""
     piece, shape = model
     turn = rotation_y(turn_rad + float(placing.rng.normal(0, 0.05)))
     half = piece.size[2] / 2

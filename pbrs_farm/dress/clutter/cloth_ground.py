@@ -26,10 +26,7 @@ Cells = NDArray[np.int64]
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Ground:
-    """A height map in its own frame (x, y up, z), metres, with the sides of its steps.
-
-    Create it with `of`: obstacles are widened by grown_m on each side.
-    """
+    """A height map in its own frame (x, y up, z), metres, obstacles widened by grown_m; made by `of`."""
 
     grid: PlanGrid  # its axes are the frame's
     heights: F64  # (rows, columns)
@@ -58,11 +55,7 @@ class Ground:
         return Ground(grid, grown, heights, corners, sides, outward, cKDTree(sides), n * CELL_M)
 
     def at(self, x: F64, z: F64) -> F64:
-        """(...) heights under places of the frame.
-
-        x and z are metres in the frame, of any one shape; places beyond the grid take its border's
-        height.
-        """
+        """(...) heights under places (x, z) of the frame, metres; beyond the grid its border's."""
         return np.asarray(self.heights[self._cells(x, z)])
 
     def _cells(self, x: F64, z: F64) -> tuple[Cells, Cells]:
@@ -84,10 +77,7 @@ class Ground:
         return short
 
     def ways_out(self, points: F64, apart_m: float) -> F64:
-        """(3, ...) shortest moves that bring points (3, ...) to a distance from the solid.
-
-        Zero for points at that distance already. apart_m: at least 0, metres.
-        """
+        """(3, ...) shortest moves, maybe 0, that bring points (3, ...) apart_m >= 0 from the solid."""
         x, y, z = points
         move = np.zeros_like(points)
         short = self.at(x, z) + apart_m - y

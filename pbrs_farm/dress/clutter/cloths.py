@@ -83,10 +83,7 @@ def lay_duvet(
 
 
 def lay_throw(placing: Placing, scene: SceneTriangles, index: int, more: F64 | None = None) -> None:
-    """Let a throw fall over items[index], where it was left. more: triangles that lie there, too.
-
-    Refused, and counted, where what rises beside the seat would hold it.
-    """
+    """Let a throw fall over items[index] and more triangles; refused, and counted, if it would be held up."""
     rng = placing.rng
     (low, high), style = scene.bounds[index], placing.style
     across = float(max(high[0] - low[0], high[2] - low[2]))
@@ -121,11 +118,7 @@ def lay_throw(placing: Placing, scene: SceneTriangles, index: int, more: F64 | N
 def drop_clothes(
     placing: Placing, scene: SceneTriangles, at: F64, level: float, *, napkin: bool = False
 ) -> None:
-    """Drop a garment, or a napkin, in a heap at a plan position.
-
-    at: (2,) world (x, z), metres. level: approximate world y of the support there. Refused, and
-    counted, if it would hang on an obstacle beside it. Collides with cloth dropped before in this room.
-    """
+    """Drop a garment or napkin in a heap at (2,) metres near y level; refused, and counted, if held up."""
     rng, style = placing.rng, placing.style
     near = np.array([[at[0] - 0.3, level, at[1] - 0.3], [at[0] + 0.3, level, at[1] + 0.3]])
     grid, sides, rows = _over(near[0], near[1], float(rng.uniform(-np.pi, np.pi)))

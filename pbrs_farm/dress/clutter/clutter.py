@@ -43,11 +43,7 @@ _SCREEN_WORDS = frozenset({"laptop", "computer", "monitor", "screen", "notebook"
 
 
 def add_clutter(house: MutableHouse, catalogue: Catalogue, style: Style, share: float) -> None:
-    """Add small items where they belong, each touching only its support.
-
-    Every room has its own random generator. Items without a place are counted by reason in
-    house.refused.
-    """
+    """Add small items where they belong, by a generator per room; refusals are counted."""
     space = house_space(house)
     scene = SceneTriangles(house.items)
     covers = content().book_covers(house.rng("clutter", "covers"), style)
@@ -63,11 +59,7 @@ def add_clutter(house: MutableHouse, catalogue: Catalogue, style: Style, share: 
 
 
 def house_bias(rng: np.random.Generator) -> float:
-    """Tidiness of a home: ProcTHOR's Beta(3.5, 1.9) on -0.3..0.1, raised.
-
-    Between -0.15 and 0.25, added to fill levels. One number per home, so that tidy and untidy homes
-    differ (Deitke et al. 2022, ProcTHOR).
-    """
+    """A home's bias of fill levels, -0.15..0.25: ProcTHOR's Beta(3.5, 1.9), raised (Deitke et al. 2022)."""
     return float(rng.beta(3.5, 1.9) * 0.4 - 0.15)
 
 

@@ -53,11 +53,7 @@ def around_thing(
 
 
 def put_as_it_is(placing: Placing, model: Model, surfaces: list[Surface]) -> None:
-    """Add an item whose surfaces (in the order of its shape's) have world coordinates already.
-
-    For cloth and cushions shaped to their support. Normals are kept, and materials are those of the
-    shape. Collisions are not checked.
-    """
+    """Add an item shaped to its support: surfaces in the world, in its shape's order; nothing is checked."""
     piece, shape = model
     nonempty = tuple(
         replace(surface, material=old.material)
@@ -80,11 +76,7 @@ class Seat:
 
 
 def dress_seat(placing: Placing, scene: SceneTriangles, index: int, most: int) -> int:
-    """Lean up to `most` cushions on the back of items[index]; returns their number.
-
-    Returns 0, with the reason counted, without a seat with a back. Cushions go to the corners first,
-    then to any free place along the back.
-    """
+    """Lean up to `most` cushions on the back of items[index], corners first; how many, 0 (counted)."""
     rng = placing.rng
     seat = find_seat(scene, index, placing.room.floor_y)
     if seat is None:
@@ -113,11 +105,7 @@ def dress_seat(placing: Placing, scene: SceneTriangles, index: int, most: int) -
 
 
 def find_seat(scene: SceneTriangles, index: int, floor_y: float) -> Seat | None:
-    """The seat of items[index] and the start of its back; None without a seat.
-
-    floor_y in world metres. The back is the side with the highest border, the box's own back if sides
-    are alike.
-    """
+    """The seat of items[index] and its back, at its highest border, else its box's; None without."""
     corners = scene.of_item(index)
     points = corners.reshape(-1, 3)
     if not len(points):

@@ -79,10 +79,7 @@ class Net:
 def flat_net(
     size: tuple[float, float], thread_m: float, middle: tuple[float, float, float], turn_rad: float
 ) -> Net:
-    """A level net of width and depth about a middle, of at least 3 x 3 vertices.
-
-    Rows run along z and columns along x before the turn about +y; metres, in the ground's frame.
-    """
+    """A level net, 3 x 3 vertices at least, rows along z before the turn about +y; metres of the ground."""
     n = [max(3, round(s / thread_m) + 1) for s in size]
     x, z = np.meshgrid(*(np.linspace(-s / 2, s / 2, k) for s, k in zip(size, n, strict=True)))
     c, s = np.cos(turn_rad), np.sin(turn_rad)
@@ -156,10 +153,7 @@ def _fall(at: F64, thread_m: tuple[float, float], ground: Ground, gap_m: float) 
 
 
 def _lift_threads(at: F64, ground: Ground, gap_m: float) -> None:
-    """Move threads off obstacles between their ends, in place; gap_m: clearance.
-
-    Otherwise the back of a sofa would pass between two threads, and edges would stick out of cloth.
-    """
+    """Move threads, not only their ends, off obstacles by gap_m, in place."""
     for view in (at, at.swapaxes(1, 2)):
         a, b = view[:, :-1], view[:, 1:]
         # Half of it: a vertex has a thread to either side.
@@ -169,10 +163,7 @@ def _lift_threads(at: F64, ground: Ground, gap_m: float) -> None:
 
 
 def _pull(at: F64, thread_m: tuple[float, float], push: float) -> None:
-    """Restore thread and diagonal lengths, in place; push: stiffness if they are too short.
-
-    Pairs without common vertices are corrected together.
-    """
+    """Restore thread and diagonal lengths in place, pairs without common vertices together."""
     for view, length in zip((at, at.swapaxes(1, 2)), thread_m, strict=True):
         for start in (0, 1):
             a, b = view[:, start:-1:2], view[:, start + 1 :: 2]
@@ -202,10 +193,7 @@ def _correct(a: F64, b: F64, length: float, pull: float, push: float) -> None:
 
 
 def _folded(at: F64, thread_m: tuple[float, float], folds: Folds, rng: np.random.Generator) -> F64:
-    """Vertices (3, 2 R - 1, 2 C - 1) of a net (3, R, C) with ridges, as of cloth that nobody smoothed.
-
-    Cloth has the length it had: what ridges take is drawn in from its edges.
-    """
+    """Vertices (3, 2 R - 1, 2 C - 1) of a net (3, R, C) with ridges, for which cloth is drawn in."""
     shape = 2 * at.shape[1] - 1, 2 * at.shape[2] - 1
     rise = _ridges(shape, thread_m, folds, rng)
     where = [_drawn_in(rise, axis, thread_m[axis]) / 2 for axis in (0, 1)]
@@ -246,10 +234,7 @@ def _drawn_in(rise: F64, axis: int, thread_m: float) -> F64:
 
 
 def sheet_of(name: str, net: Net, ground: Ground, thick_m: float) -> Surface:
-    """A net of the ground's frame as a closed body of the world.
-
-    Texture coordinates are metres of the cloth at rest, so that patterns do not stretch with it.
-    """
+    """A net as a closed body of the world, uv in metres of the cloth at rest."""
     rows, columns = net.points.shape[:2]
     v, u = np.meshgrid(
         np.arange(rows) * net.thread_m[0], np.arange(columns) * net.thread_m[1], indexing="ij"

@@ -161,10 +161,7 @@ def _put_on_floor(placing: Placing, floor: _Floor, model: Model, *, at_wall: boo
 
 
 def _distance_to_walls(floor: _Floor, cells: Bools) -> F64:
-    """(H, W) metres from the asked cells to real walls: rooms may open into each other.
-
-    Where a home has no walls, to the room's outline.
-    """
+    """(H, W) metres from cells to real walls, or the room's outline in a home without."""
     distances = np.full(cells.shape, np.inf)
     room = floor.room
     near = shapely.intersection(room.walls, room.area.buffer(_NEAR_WALLS_M))

@@ -27,11 +27,7 @@ _MOST_IN_ROOM = 4
 
 
 def separate_pair(model: Model, rng: np.random.Generator, mess: float) -> Model:
-    """Turn and move the halves of a pair, such as shoes along x, independently.
-
-    Parts left and right of the centre move as wholes; mess 0 leaves them unchanged. The piece's size is
-    updated, and normals are dropped, since parts were turned.
-    """
+    """Turn and move the halves of a pair along x by mess (0: not at all); size updated, normals dropped."""
     piece, shape = model
     turns, ahead = rng.normal(0, 0.6 * mess, 2), rng.normal(0, 0.06 * mess, 2)
     quarter = piece.size[0] / 4
@@ -86,10 +82,7 @@ class Placing:
     )  # triangles of dropped cloth, which later cloth may fall on
 
     def put(self, model: Model, at: F64, turn_rad: float) -> None:
-        """Add the item with its base centred at (3,) world metres, turned about +y.
-
-        The caller has checked that the place is free: nothing is tested here, and no cells are marked.
-        """
+        """Add the item at a free (3,) place (its base's centre), turned about +y; nothing is tested or marked."""
         piece, shape = model
         low, high = shape.bounds
         base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
@@ -116,10 +109,7 @@ class Placing:
         self.house.refused[f"{PASS}: {reason}"] += 1
 
     def drop(self, top: Worktop, model: Model, *, faces_anywhere: bool, depth_pull: float) -> bool:
-        """Put the item where it fits on the worktop; False if it fits nowhere.
-
-        depth_pull: preference for the back (> 0) or the front (< 0), per metre.
-        """
+        """Put the item where it fits; False if nowhere. depth_pull: per metre to the back (> 0) or front."""
         size = np.asarray(model[0].size)[[0, 2, 1]]
         low, high = model[1].bounds
         size = high - low
@@ -142,10 +132,7 @@ class Placing:
         return True
 
     def drop_near(self, top: Worktop, model: Model, at: F64, *, turn_rad: float = 0.0) -> bool:
-        """Put the item at a plan position (2,), or within 6 cm of it; False if it does not fit.
-
-        at: world x and z. Occupies the worktop's cells on success; failures are not counted.
-        """
+        """Put the item within 6 cm of plan position (2,), taking its cells; False, uncounted, if it does not fit."""
         low, high = model[1].bounds
         # Of the free spots take the nearest; n: the rows and columns of cells that it covers.
         rows, columns, n = top.spots(turned_size(high - low, turn_rad), margin_m=0.01)
@@ -163,11 +150,7 @@ class Placing:
 
 
 def take_for_room(placing: Placing, kind: str) -> Model | None:
-    """An item of that kind; None, with the reason counted, if the room has enough of them.
-
-    An item counts even if it is not placed afterwards. Draws from the placing's generator only if the
-    room may have one more.
-    """
+    """An item of that kind, counted as there; None, with the reason counted, beyond the room's most."""
     if placing.taken[kind] >= CLUTTER.most_in_room.get(kind, _MOST_IN_ROOM):
         placing.refuse(f"enough of {kind} in the room")
         return None

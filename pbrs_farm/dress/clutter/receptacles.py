@@ -87,11 +87,7 @@ def can_hold(item: Item) -> bool:
 
 
 def receptacle_of(item: Item, support: Support, kind: RoomKind) -> str:
-    """The table's name for a support of an item in a room of that kind; "" holds nothing.
-
-    The first rule of the table that fits decides, so the table's order matters. Asks name, class,
-    room, height above the floor, and free height and area in metres.
-    """
+    """The first fitting row's name for a support of an item in a room, by class, height, area; or ""."""
     name, words = f"{item.name} {item.source_class}".casefold(), words_of_item(item)
     low, high = item.bounds
     is_inner = float(high[1]) - support.height > 0.1

@@ -45,11 +45,7 @@ def plan_shelves(placing: Placing, kind: RoomKind) -> ShelfPlan:
 
 
 def fill_shelf(placing: Placing, top: Worktop, plan: ShelfPlan) -> int:
-    """Fill one shelf from left to right; returns the number of items.
-
-    Every placed item occupies its cells of the worktop. Gaps are random, so full and empty shelves are
-    both valid.
-    """
+    """Fill one shelf from left to right, with random gaps, maybe not at all; the number of items."""
     rng = placing.rng
     n, column = 0, top.columns[0]
     free = top.free_height()
@@ -119,10 +115,7 @@ def _put_other(
 def _leftmost(
     placing: Placing, top: Worktop, column: int, row: list[Model], inset_m: float
 ) -> int | None:
-    """Put a row of touching items as far left as it fits; the next free column, or None.
-
-    Their fronts are aligned, inset_m behind the shelf's edge if there is space.
-    """
+    """Put a row of touching items, fronts inset_m behind the edge, far left; the next column, or None."""
     sizes = np.array([model[1].bounds[1] - model[1].bounds[0] for model in row])
     width = float(sizes[:, 0].sum() + _TOUCH_M * (len(row) - 1))
     needed = (width, float(sizes[:, 1].max()), float(sizes[:, 2].max()))

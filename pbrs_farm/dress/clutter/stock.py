@@ -53,11 +53,7 @@ class Stock:
         self._faces: Counter[str] = Counter()  # of the items taken so far, by piece
 
     def take(self, rng: np.random.Generator, kind: str, style: Style) -> Model | None:
-        """An item of that kind; None if there is no usable one.
-
-        Books and magazines are always generated; other items are taken from the catalogue or generated.
-        Designs with many triangles are used few times per home, to limit the scene's size.
-        """
+        """An item of that kind, generated or of the catalogue, heavy ones rarely; or None."""
         if kind == "book":
             # One or a pile; occasionally one is open.
             n = int(rng.choice([0, 1, 1, 2, 3, 4, 5]))

@@ -26,10 +26,7 @@ _USUAL_M2 = 0.4  # usual area of receptacles that clutter.toml does not name
 
 
 def fill_top(placing: Placing, top: Worktop, receptacle: str, present: Collection[str] = ()) -> int:
-    """Put items on the worktop by the table of shares; returns their number.
-
-    present: kinds already on it in the source.
-    """
+    """Put items by the table of shares, beside kinds already present; their number."""
     rng = placing.rng
     factor = min(top.support.area / CLUTTER.usual_m2.get(receptacle, _USUAL_M2), _MOST_FACTOR)
     kinds: list[str] = []
@@ -44,10 +41,7 @@ def fill_top(placing: Placing, top: Worktop, receptacle: str, present: Collectio
 
 
 def set_table(placing: Placing, top: Worktop, chairs: Sequence[F64], scene: SceneTriangles) -> int:
-    """Lay a place for each chair (plan positions (2,)): a plate, a glass to its right; returns their number.
-
-    After a meal, items are displaced, and a napkin is beside a plate.
-    """
+    """Lay plate and glass for each chair (2,), or, displaced and with a napkin, after a meal; their number."""
     rng, is_eaten = placing.rng, placing.rng.random() < placing.house.mess
     plate = placing.stock.take(placing.rng, "one_plate", placing.style)
     glass = placing.stock.take(placing.rng, "glass", placing.style)
@@ -78,10 +72,7 @@ def set_table(placing: Placing, top: Worktop, chairs: Sequence[F64], scene: Scen
 
 
 def put_all(placing: Placing, top: Worktop, kinds: list[str]) -> int:
-    """Put an item of each kind on the worktop, the largest first.
-
-    Kinds of which the room has enough, and items without a place, are left out and counted by reason.
-    """
+    """Put an item of each kind, the largest first, or count why not; their number."""
     things: list[tuple[str, Model]] = []
     for kind in kinds:
         model = take_for_room(placing, kind)

@@ -81,10 +81,7 @@ def refit_to_walls(
 
 
 def _is_held(bodies: Sequence[Body]) -> bool:
-    """True if hung items touch their support, and no wall penetrates an added item.
-
-    Repair moves neither the items nor any other support.
-    """
+    """True if hung items touch their support and no wall penetrates an added item; repair moves neither."""
     hung = [k for k, b in enumerate(bodies) if b.is_new and _hangs(b)]
     plumb = Plumb(bodies, hung)
     if not all(by.is_good for by in held(bodies, hung, plumb).values()):

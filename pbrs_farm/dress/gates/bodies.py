@@ -61,10 +61,7 @@ class Body:
 
     @property
     def shells(self) -> list[Shell]:
-        """Its connected parts, found at the first call.
-
-        Found at the first call and kept: few bodies are ever asked.
-        """
+        """Its connected parts, found at the first call."""
         if self._shells is None:
             self._shells = shells_of(self.corners)
         return self._shells
@@ -80,10 +77,7 @@ class Body:
 def bodies_of(
     house: MutableHouse, pieces: Mapping[str, Piece], reusable: Mapping[int, Body] | None = None
 ) -> list[Body]:
-    """A body for each item of the house that has triangles, in order.
-
-    pieces: by id. reusable: bodies by the id of their item.
-    """
+    """A body for each item with triangles, in order; reusable: known ones by item id."""
     bodies = []
     n_source = len(house.source.items)
     for index, item in enumerate(house.items):
@@ -105,19 +99,12 @@ def bodies_of(
 
 
 def piece_id(item: Item) -> str:
-    """The id of the catalogue's piece that an added or swapped item was made from.
-
-    "" for an item of the source, read from its tags.
-    """
+    """The id of the catalogue's piece of an added or swapped item, by its tags; "" for others."""
     return next((t.removeprefix(ADDED_TAG) for t in item.tags if t.startswith(ADDED_TAG)), "")
 
 
 def has_same_mesh(a: Item, b: Item) -> bool:
-    """True if two items have the same triangles, whatever their materials and order.
-
-    Equal to the bit: a door split into leaf and frame is equal, a moved one is not. Normals and
-    texture coordinates are not compared.
-    """
+    """True if two items have the same triangles to the bit, whatever their order and materials."""
     if a is b or a.surfaces is b.surfaces:
         return True
     if a.n_faces != b.n_faces:
@@ -136,11 +123,7 @@ def has_same_mesh(a: Item, b: Item) -> bool:
 
 
 def shells_of(corners: F64) -> list[Shell]:
-    """The connected parts of triangles (F, 3, 3); corners of one place are one vertex.
-
-    float64 corners; triangles with two corners at one place are left out. Places must be equal to
-    the bit, so meshes with gaps of rounding fall apart: weld such ones first.
-    """
+    """The connected parts of triangles (F, 3, 3), joined at corners equal to the bit, degenerate ones left out."""
     faces, vertices = welded(corners)
     faces = faces[(faces != np.roll(faces, 1, axis=1)).all(1)]
     if not len(faces):
@@ -170,11 +153,7 @@ def _shell(vertices: F64, faces: Faces) -> Shell:
 
 
 def welded(corners: F64) -> tuple[Faces, F64]:
-    """Faces (F, 3) as numbers of places, and the places (V, 3), of triangles (F, 3, 3).
-
-    int64 faces. Places are those that differ in any bit, in no order that means something; -0
-    counts as 0.
-    """
+    """(F, 3) numbers of places and the places (V, 3), different to the bit but for -0, of triangles."""
     points = np.ascontiguousarray(corners.reshape(-1, 3)) + 0.0  # no negative zero
     # Compare the bits of whole points: faster than comparing column by column.
     keys = points.view(np.dtype((np.void, 24))).ravel()
@@ -183,9 +162,6 @@ def welded(corners: F64) -> tuple[Faces, F64]:
 
 
 def boxes_of(bodies: Sequence[Body]) -> tuple[F64, F64]:
-    """(N, 3) lowest and highest corners of bodies.
-
-    float64 metres, (0, 3) for no bodies.
-    """
+    """(N, 3) lowest and highest corners of bodies, metres."""
     low = np.array([b.low for b in bodies]).reshape(-1, 3)
     return low, np.array([b.high for b in bodies]).reshape(-1, 3)

@@ -1,7 +1,4 @@
-"""Gate: no added item blocks doors and drawers of furniture, measured on meshes; no effects.
-
-The bodies are those of the space, in its order.
-"""
+"""Gate: no added item blocks doors and drawers of furniture, measured on meshes; no effects."""
 
 from __future__ import annotations
 

@@ -1,7 +1,4 @@
-"""Measure a house by its gates, remove violating items, and measure again; state: the house is changed.
-
-Added items are removed; replaced items are restored to those of the source.
-"""
+"""Remove added items (and restore replaced ones) that violate the gates of a house, which is changed."""
 
 from __future__ import annotations
 
@@ -122,10 +119,7 @@ def _measure_gates(
 
 
 def _space(house: MutableHouse, bodies: list[Body]) -> tuple[HouseSpace, list[Body]]:
-    """The space of the house without small items, and its bodies in the same order.
-
-    Hundreds of small items on furniture block no way.
-    """
+    """The space of the house without small items, which block no way, and its bodies in that order."""
     floors = np.array([room.floor_y for room in house.source.rooms] or [0.0])
     large = [
         b
@@ -201,10 +195,7 @@ def _take_out(house: MutableHouse, out: Mapping[int, str]) -> None:
 
 
 def pass_that_added(item: Item) -> str:
-    """The pass that added an item, from its id `dress-<pass>-<n>`.
-
-    "dress" for an id of another form. Only for added items: those of the source have other ids.
-    """
+    """The pass in an added item's id `dress-<pass>-<n>`, else "dress"."""
     words = item.id.split("-")
     return words[1] if len(words) > 2 and words[0] == "dress" else "dress"
 

@@ -1,8 +1,4 @@
-"""Gate: no two items overlap by more than 1 cm, measured on their meshes; no effects.
-
-For two closed shells the overlap is computed as a solid. For open meshes, surface samples of each
-are tested against the other. Boxes only exclude pairs.
-"""
+"""Gate: no two items overlap by more than 1 cm: solids of closed shells, samples of open meshes; no effects."""
 
 from __future__ import annotations
 
@@ -27,11 +23,7 @@ _BEHIND_CURTAINS = (ItemKind.WALL, ItemKind.WINDOW, ItemKind.DOOR)
 
 
 def near_pairs(bodies: Sequence[Body]) -> Iterator[tuple[int, int]]:
-    """Pairs of indices, ascending, of an added body and any other with an overlapping box.
-
-    Pairs of two added bodies occur once, pairs of two source items never. Allowed overlaps
-    (`is_allowed`) and unmeasured kinds are skipped. Whether the meshes touch is not tested here.
-    """
+    """Pairs of an added body and any other with an overlapping box, once each, if measured and not allowed."""
     low, high = boxes_of(bodies)
     measured = np.array([b.item.kind not in _UNMEASURED for b in bodies], bool)
     is_new = np.array([b.is_new for b in bodies], bool) & measured
@@ -51,10 +43,7 @@ def _box_depth(low: F64, high: F64, lows: F64, highs: F64) -> F64:
 
 
 def is_allowed(a: Body, b: Body) -> bool:
-    """True if two items may overlap: rugs under legs, curtains against walls and windows.
-
-    Rugs only if added; curtains and blinds only with walls, doors or windows behind them. Symmetric.
-    """
+    """True if two items may overlap, in any order: added rugs under legs, curtains at walls and windows."""
     for first, second in ((a, b), (b, a)):
         if first.is_new and first.item.nyu40 == FLOOR_MAT:
             return True
@@ -64,11 +53,7 @@ def is_allowed(a: Body, b: Body) -> bool:
 
 
 def penetration_m(a: Body, b: Body, solids: Solids) -> float:
-    """How deep two bodies enter each other, metres; 0 where they do not.
-
-    The deepest point of either in the other, how thick what they share is, or how far an edge of
-    one passes through a face of the other, whichever is most.
-    """
+    """Metres, 0 if apart: the deepest point, the overlap's thickness or an edge's way through a face."""
     deepest = 0.0
     for shell in _shells_near(a, b):
         for other_shell in _shells_near(b, a):

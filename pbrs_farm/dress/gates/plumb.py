@@ -36,10 +36,7 @@ class Hits:
 
 
 class Plumb:
-    """Vertical lines through all faces of bodies that are not vertical.
-
-    asked: indices of bodies; faces neither above nor below one of them are skipped.
-    """
+    """Vertical lines through all faces of bodies but vertical ones and those far from the bodies `asked`."""
 
     def __init__(self, bodies: Sequence[Body], asked: Sequence[int]) -> None:
         low, high = boxes_of(bodies)
@@ -71,11 +68,7 @@ class Plumb:
             self._grids.append(grid)
 
     def hits(self, points: F64, reach_m: float) -> Hits:
-        """Every face at most reach_m above or below points (N, 3), edges included.
-
-        A point may have no hit or many, in no order of height. float64 metres. Of each hit it gives
-        the number of the point, the height and whose face it is.
-        """
+        """Number of the point, height and body of every face within reach_m above or below points (N, 3)."""
         candidates = [grid.candidates(points[:, [0, 2]]) for grid in self._grids]
         place, triangle = (np.concatenate(parts) for parts in zip(*candidates, strict=True))
         # Leave out faces that lie too high or too low, then those beside the place.

@@ -19,10 +19,7 @@ _PAIRS: Final = 1_000_000  # edge-face pairs per batch, to bound memory
 
 
 def crossing_m(a: Shell, b: Shell, least_m: float) -> float:
-    """Largest length of an edge of a on both sides of a face of b, metres; 0 for none.
-
-    Edges shorter than twice least_m are skipped.
-    """
+    """Largest length, twice least_m or more, of an edge of a on both sides of a face of b, metres; or 0."""
     start, end = _edges_near(a, b, 2 * least_m)
     corners = b.corners
     low, high = triangle_bounds(corners)
@@ -146,11 +143,7 @@ class Solids:
         self._made: dict[int, tuple[Shell, Any]] = {}
 
     def shared(self, a: Shell, b: Shell) -> list[F64]:
-        """The connected parts of what two closed shells share, as triangles (F, 3, 3).
-
-        [] where one of the two is no closed solid, or what they share is a speck. Solids of shells
-        are kept, as one meets several others.
-        """
+        """Parts, as triangles (F, 3, 3), that two closed shells share; [] for open ones or specks."""
         solid_a, solid_b = self._solid(a), self._solid(b)
         if solid_a is None or solid_b is None:
             return []
@@ -179,10 +172,7 @@ class Solids:
 
 
 def thickness(corners: F64) -> float:
-    """How thick a closed solid of triangles (F, 3, 3) is, metres: its least width across its faces.
-
-    Of a bent skin it is three times the volume over half the surface, as for a plate or less.
-    """
+    """Least width across faces of a closed solid (F, 3, 3), metres, of a bent skin about its thickness."""
     vectors = area_vectors(corners)
     areas = np.linalg.norm(vectors, axis=1)
     surface = float(areas.sum()) / 2

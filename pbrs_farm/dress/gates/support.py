@@ -44,11 +44,7 @@ class Held:
 
 
 def held(bodies: Sequence[Body], numbers: Sequence[int], plumb: Plumb) -> dict[int, Held]:
-    """Support of each of some bodies, by index: the surface below, else the wall behind.
-
-    numbers: indices of the bodies. plumb: of all bodies. A body without support gets the smallest gap;
-    test `is_good`.
-    """
+    """Support of bodies by number: the surface below, else the wall behind, else the smallest gap (`is_good`)."""
     low, high = boxes_of(bodies)
     supports = _find_what_holds(bodies, numbers, plumb)
     for number in numbers:
@@ -61,11 +57,7 @@ def held(bodies: Sequence[Body], numbers: Sequence[int], plumb: Plumb) -> dict[i
 
 
 def held_as_drawn(bodies: Sequence[Body], number: int, plumb: Plumb) -> Held:
-    """Support of the source's item that a body has replaced, among the same bodies.
-
-    Only for replacements. Items that float in the source may float as much afterwards: the gate
-    compares with this.
-    """
+    """Support of the source's item that a body replaces; its gap is the one allowed afterwards."""
     body = bodies[number]
     assert body.was is not None
     corners = item_triangles(body.was)

@@ -1,7 +1,4 @@
-"""Gates of what must stay free: doors and the space before them, windows, ways; on meshes, no effects.
-
-The bodies are those of the space, in its order.
-"""
+"""Gates of what must stay free, on meshes: doors, windows, ways; bodies in the space's order; no effects."""
 
 from __future__ import annotations
 
@@ -41,11 +38,7 @@ def _is_in_the_way(body: Body) -> bool:
 
 
 def blocked_doors(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[Blocked]]:
-    """Number of door sides, and the added bodies in a swing or within 0.8 m of one.
-
-    Windows and sides that lead to no room do not count. Curtains, and items lower than a step or above
-    head height, block nothing.
-    """
+    """Number of sides of room doors, and added bodies between step and head height in a swing or 0.8 m before."""
     n, blocked = 0, []
     boxes = boxes_of(bodies)
     for door in space.passages:
@@ -64,10 +57,7 @@ def blocked_doors(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[
 
 
 def _may_enter(boxes: tuple[F64, F64], passage: Passage, side: int, low: F64, high: F64) -> Bools:
-    """(N,) whether boxes meet a box before a passage; some that do not are among them.
-
-    boxes: (N, 3) lowest and highest corners in the world. low, high: (3,) as in_front_of has them.
-    """
+    """(N,) whether boxes may meet a box before a passage; low, high: (3,) as in_front_of."""
     middle, half = (boxes[0] + boxes[1]) / 2, (boxes[1] - boxes[0]) / 2
     axes = np.array([passage.along, [0.0, 1.0, 0.0], passage.inward(side)])
     offset = in_front_of(passage, side, middle)
@@ -81,20 +71,13 @@ def _enters(body: Body, door: Passage, side: int, low: F64, high: F64) -> bool:
 
 
 def in_front_of(passage: Passage, side: int, points: F64) -> F64:
-    """(..., 3) points as metres along a passage from its middle, world y, and out from the wall.
-
-    points (..., 3) in the world, metres. The third number is positive on that side of the wall and
-    negative within it.
-    """
+    """(..., 3) metres along a passage from its middle, world y, and out of the wall to that side."""
     moved = points - passage.face_point(side)
     return np.stack([moved @ passage.along, points[..., 1], moved @ passage.inward(side)], axis=-1)
 
 
 def covered_windows(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[Blocked]]:
-    """Number of window sides, and the added furniture that covers a fifth of one.
-
-    If several cover it together, the largest ones, until less than a fifth is covered.
-    """
+    """Number of window sides, and the added furniture (the largest of several) that covers a fifth."""
     n, blocked = 0, []
     for window in space.passages:
         sides = [s for s in (0, 1) if window.is_window and window.room_ids[s] is not None]
@@ -111,10 +94,7 @@ def covered_windows(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, lis
 def _covers(
     window: Passage, side: int, space: HouseSpace, bodies: Sequence[Body]
 ) -> dict[int, Bools]:
-    """New body -> (rows, columns) which cells of a window it covers, seen from the room.
-
-    Bodies that are not near are left out.
-    """
+    """New body near the window -> (rows, columns) cells that it covers, seen from the room."""
     # A grid over the opening; low and high bound the space before it, in the window's frame.
     columns = max(1, round(window.width / _CELL_M))
     rows = max(1, round((window.top_y - window.bottom_y) / _CELL_M))
@@ -139,11 +119,7 @@ def _covers(
 
 
 def closed_ways(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[Blocked]]:
-    """Number of rooms with two doors, and the added bodies that block the way between them.
-
-    Only rooms with a free way before dressing. Bodies are named from the last one on, until a way
-    0.6 m wide connects the doors again.
-    """
+    """Number of rooms with two doors, and added bodies, last first, to go until a way of 0.6 m joins them."""
     n, blocked = 0, []
     for room in space.rooms:
         if sum(door.side_of(room.room.id) is not None for door in room.doors) < 2:

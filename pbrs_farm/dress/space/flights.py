@@ -32,11 +32,7 @@ class Flights:
 
 
 def flights_of(house: MutableHouse, room: Room, area: BaseGeometry) -> Flights:
-    """The stairs of the house in a room or ending there. area: the room's plan.
-
-    Two plan areas: the stairs themselves, and the floor in front of their ends. Flights of other
-    storeys nearby in plan are skipped.
-    """
+    """Plan areas of the stairs in a room (area) or ending there, and of the floor before their ends."""
     under, before = [], []
     near = area.buffer(_REACH_M)
     for treads, plan in _stairs(house):

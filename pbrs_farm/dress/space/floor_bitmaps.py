@@ -26,11 +26,7 @@ class FloorBitmap:
     ways: NDArray[np.int32]  # (H, W) number of the connected walkable way; 0 = none
 
     def cells(self, places: F64) -> NDArray[np.int64]:
-        """(N, 2) row and column of plan places (N, 2); may lie outside.
-
-        int64. Ask whether they lie inside before indexing: a negative index would count from the
-        other end.
-        """
+        """(N, 2) row and column, maybe outside, of plan places (N, 2)."""
         return FloorGrid(self.origin, self.inside.shape).cells(places)
 
 
@@ -61,20 +57,14 @@ def floor_bitmap(
 
 
 def with_body(bitmap: FloorBitmap, body: Bools, width_m: float = WALK_M) -> FloorBitmap:
-    """The floor with an additional body (H, W); width_m: minimum width of ways.
-
-    Returns a new bitmap. Takes a distance transform, so test candidates by the occupied cells first.
-    """
+    """The floor with an additional body (H, W) and ways of width_m; slow, so test the cells first."""
     occupied = bitmap.occupied | body
     ways = connected_ways(bitmap.inside & ~occupied, width_m)
     return replace(bitmap, occupied=occupied, ways=ways)
 
 
 def doors_are_joined(bitmap: FloorBitmap, room: RoomSpace) -> bool:
-    """True if one way connects all doors of the room, or it has fewer than two.
-
-    Compare before and after adding a body (`with_body`): only an existing way can be blocked.
-    """
+    """True if one way connects all doors of the room; compare before and after `with_body`."""
     common: set[int] | None = None
     doors = [(d, s) for d in room.doors if (s := d.side_of(room.room.id)) is not None]
     if len(doors) < 2:

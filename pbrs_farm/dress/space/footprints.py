@@ -19,10 +19,7 @@ _SQUARE_M = 0.01
 
 
 def item_footprint(item: Item, low_y: float = -_FAR, high_y: float = _FAR) -> BaseGeometry:
-    """Plan area of the item's triangles between low_y and high_y; may be empty.
-
-    Vertical faces count as strips 8 mm wide, so that shapes without a bottom have their outline.
-    """
+    """Plan area, maybe empty, of the triangles between two heights, vertical faces as strips of 8 mm."""
     corners = item_triangles(item)
     if low_y > -_FAR or high_y < _FAR:
         low, high = np.array([-_FAR, low_y, -_FAR]), np.array([_FAR, high_y, _FAR])
@@ -80,11 +77,7 @@ def _area_by_squares(points: F64) -> BaseGeometry:
 
 
 def areal(shape: BaseGeometry) -> BaseGeometry:
-    """shape without lines and points, valid.
-
-    What shapely's overlays leave of touching edges would else be drawn and measured. An empty shape
-    where nothing has an area.
-    """
+    """shape without the lines and points of overlays, valid; may be empty."""
     shape = shapely.make_valid(shape)
     if shape.geom_type in ("Polygon", "MultiPolygon"):
         return shape

@@ -50,20 +50,13 @@ class RoomSpace:
     above: F64  # (F, 3, 3) triangles of ceilings and of what else is over it
 
     def ceiling_y(self, places: F64) -> F64:
-        """(N,) y of the lowest structure above the floor at plan positions (N, 2), world metres.
-
-        The nominal height for positions without structure above.
-        """
+        """(N,) world y of the lowest structure above plan positions (N, 2), else the nominal height."""
         return _ceiling(self.above, self.room)(places)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
 class HouseSpace:
-    """The home's rooms in its order, its doors and windows, and points on every item's surface.
-
-    `points` sample the surfaces: every surface point is within about 2 cm of one. A value: it does not
-    follow later changes of the house.
-    """
+    """Rooms, doors, windows, and points of surfaces, to about 2 cm; later changes need a new one."""
 
     rooms: tuple[RoomSpace, ...]
     passages: tuple[Passage, ...]
@@ -78,10 +71,7 @@ class HouseSpace:
         raise KeyError(room_id)
 
     def is_free(self, low: F64, high: F64, *, without: Collection[int] = ()) -> bool:
-        """Whether no item but structure has a point in the box low..high (3,) of the world.
-
-        without: numbers of items that do not count.
-        """
+        """True if no item but structure and `without` has a point in the box low..high (3,)."""
         for n in meeting(self.bounds, np.array([low, high])):
             if (
                 n not in without
@@ -139,11 +129,7 @@ def house_space(house: MutableHouse) -> HouseSpace:
 
 
 def floor_space(house: MutableHouse) -> HouseSpace:
-    """Like house_space, without wall faces, which makes it cheaper.
-
-    For passes that place nothing on walls: `faces` of every room is empty. Per-item results are cached
-    in the house.
-    """
+    """Like house_space, but cheaper, without wall faces, for passes that use no walls."""
     cached = house.kept.get("space")
     if not isinstance(cached, _KeptSpaces):
         cached = house.kept["space"] = _empty_house(house)

@@ -63,10 +63,7 @@ class Passage:
         return np.asarray(self.centre + self.inward(side) * self.half_wall[side])
 
     def before(self, side: int, depth_m: float = BEFORE_DOOR_M) -> BaseGeometry:
-        """The plan rectangle (x, z) in front of the hole on a side, as wide as the hole.
-
-        side: 0 or 1, of side_of. depth_m: how far it reaches into the room.
-        """
+        """The plan rectangle, depth_m deep, in front of the hole on a side (0 or 1)."""
         face, out = self.face_point(side)[[0, 2]], self.inward(side)[[0, 2]] * depth_m
         half = self.along[[0, 2]] * self.width / 2
         return shapely.Polygon([face - half, face + half, face + half + out, face - half + out])
@@ -77,10 +74,7 @@ class Passage:
         return max(BEFORE_DOOR_M, min(self.width, 1.0))
 
     def swing(self, side: int) -> BaseGeometry:
-        """The plan area that a leaf as wide as the hole sweeps on a side.
-
-        Which end it is hung on is unknown, so both are counted.
-        """
+        """The plan area that leaves as wide as the hole, hung on either end, sweep on a side."""
         middle, half = self.face_point(side)[[0, 2]], self.along[[0, 2]] * self.width / 2
         discs = [shapely.Point(middle + s * half).buffer(self.width) for s in (-1, 1)]
         return shapely.intersection(shapely.union_all(discs), self.before(side, self.width))
@@ -92,11 +86,7 @@ def passages_of(
     rooms: Sequence[tuple[Room, BaseGeometry]],
     walls_at: WallsAt,
 ) -> tuple[Passage, ...]:
-    """Every door, archway and window, in the house's order; walls_at: plan area of walls at a height.
-
-    A doorway is at the walls' hole, even if its leaf is drawn open. Windows without a hole, and doors
-    outside of walls, are given by their own boxes.
-    """
+    """Doors and windows in order, at the walls' hole, or, without one, in the wall at their box."""
     by_id = {item.id: item for item in items}
     passages = [_from_opening(o, rooms, walls_at) for o in openings]
     with_hole = {o.item_id for o in openings}
@@ -143,11 +133,7 @@ def _from_opening(
 def _depth_of_walls(
     area: BaseGeometry, walls: BaseGeometry, normal: F64
 ) -> tuple[float, float] | None:
-    """Interval along a normal of the wall that a plan area crosses; None without a wall.
-
-    Of several walls the one that fills most of the area's width wins: an open leaf also touches the
-    wall beside it.
-    """
+    """Interval along a normal of the wall that fills most of an area's width; None without a wall."""
     if area.is_empty:
         return None
     across, along = normal[[0, 2]], np.array([normal[2], -normal[0]])
@@ -207,10 +193,7 @@ def _from_item(
 
 
 def _doorway(corners: F64, normal: F64, walls: BaseGeometry) -> F64 | None:
-    """(4, 3) hole of a door in a wall across a normal, from the corners (8, 3) of the door's box.
-
-    In a wall without a hole, the intersection with the box. None without either.
-    """
+    """(4, 3) hole in a wall across a normal, else the wall at the box (8, 3); None without a wall."""
     across = normal[[0, 2]] / np.linalg.norm(normal[[0, 2]])
     along = np.array([across[1], -across[0]])
     plan = corners[:, [0, 2]]

@@ -105,11 +105,7 @@ def _rooms_before(
 def with_structure(
     face: WallFace, walls: WallAreas, passages: Sequence[Passage], ceiling_y: Callable[[F64], F64]
 ) -> WallFace:
-    """The face with its free space limited by walls, openings and ceilings.
-
-    The face given is not changed. ceiling_y gives the height, world metres, over plan places (N,
-    2). Things of the room are not considered: see `with_things`.
-    """
+    """A copy limited by walls, openings and ceiling_y over plan places (N, 2); not by items."""
     clear = face.clear.copy()
     columns = np.asarray((np.arange(clear.shape[1]) + 0.5) * CELL_M, np.float64)
     ys = face.low_y + (np.arange(clear.shape[0]) + 0.5) * CELL_M
@@ -144,10 +140,7 @@ def with_things(face: WallFace, hidden: Sequence[Hidden | None]) -> WallFace:
 
 
 def reach_of(face: WallFace) -> F64:
-    """(2, 3) bounds of the space in front of the face in which items limit it.
-
-    Metres, world; an item whose box is outside does not limit the face.
-    """
+    """(2, 3) bounds of the space before the face in which items limit it, world metres."""
     ends = [
         face.point(s, y, out)
         for s in (0.0, face.length)

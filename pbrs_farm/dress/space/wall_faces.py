@@ -1,7 +1,4 @@
-"""The faces of walls as rooms see them, and how much free space is before each place; no effects.
-
-A face is found by the walls' triangles, not by the room's outline, which may lie centimetres off.
-"""
+"""Walls as rooms see them, by their triangles, and free depth before each place; no effects."""
 
 from __future__ import annotations
 
@@ -59,27 +56,17 @@ class WallFace:
         return float(np.arctan2(self.normal[0], self.normal[2]))
 
     def point(self, s: float, y: float, out_m: float = 0.0) -> F64:
-        """(3,) world point at s along the face, at world height y, out_m before it.
-
-        s in metres from the face's first column, y in world metres and not from the floor.
-        """
+        """(3,) world point at s from the first column, world height y, out_m before the face; metres."""
         point = self.origin + self.along * s + self.normal * out_m
         point[1] = y
         return np.asarray(point)
 
     def s_of(self, points: F64) -> F64:
-        """(N,) how far along the face points (N, 3) lie.
-
-        Metres from the first column; below 0 or above `length` beside the face. points are float64,
-        world.
-        """
+        """(N,) metres along the face of points (N, 3), outside 0 .. `length` beside it."""
         return np.asarray((points - self.origin) @ self.along)
 
     def out_of(self, points: F64) -> F64:
-        """(N,) how far before the face points (N, 3) lie.
-
-        Metres along the normal; negative behind the wall's plane.
-        """
+        """(N,) metres before the face of points (N, 3); negative behind the wall's plane."""
         return np.asarray((points - self.origin) @ self.normal)
 
     def recess_m(self, s0: float, s1: float) -> float:
@@ -89,11 +76,7 @@ class WallFace:
         return float(part.min()) if part.size else 0.0
 
     def free_m(self, s0: float, s1: float, y0: float, y1: float) -> float:
-        """The least free space before the rectangle s0..s1, y0..y1 (world heights); 0 beyond the face.
-
-        Metres out from the wall; s along the face, y0 and y1 in the world. A rectangle that reaches
-        beyond the face anywhere has 0.
-        """
+        """Least free depth, metres, before s0..s1, y0..y1 (world); 0 if it reaches beyond the face."""
         rows, columns = self._window(s0, s1, y0, y1)
         n_rows, n_columns = self.clear.shape
         if rows[0] < 0 or columns[0] < 0 or rows[1] > n_rows or columns[1] > n_columns:
@@ -119,17 +102,11 @@ class WallFace:
         return np.asarray(np.flatnonzero(count[n:] - count[:-n] == n) * CELL_M, np.float64)
 
     def taken(self, s0: float, s1: float, y0: float, y1: float) -> WallFace:
-        """The face with the rectangle s0..s1, y0..y1 (world heights) occupied; a new value.
-
-        Parts outside the face are ignored.
-        """
+        """A copy with the part inside of the rectangle s0..s1, y0..y1 (world heights) occupied."""
         return self.limited(s0, s1, y0, y1, 0.0)
 
     def limited(self, s0: float, s1: float, y0: float, y1: float, free_m: float) -> WallFace:
-        """The face with at most free_m metres free in front of a rectangle s0..s1, y0..y1; a new value.
-
-        For obstacles that leave space for flat items behind them.
-        """
+        """A copy with at most free_m free before a rectangle, behind an obstacle for flat items."""
         rows, columns = self._window(s0, s1, y0, y1)
         clear = self.clear.copy()
         part = clear[max(rows[0], 0) : max(rows[1], 0), max(columns[0], 0) : max(columns[1], 0)]
@@ -174,11 +151,7 @@ class WallPlane:
         return np.asarray(points[:, [0, 2]])
 
     def covered(self, s0: float, y0: float, shape: tuple[int, int]) -> Bools:
-        """(H, S) cells, from s0 and y0 on, whose middle is on a triangle.
-
-        s0 along the plane and y0 in the world, metres; shape is (rows, columns). Middles on an edge
-        count as covered.
-        """
+        """(H, S) cells from s0 and y0 (world) on, metres, whose middle is on a triangle or its edge."""
         ss = s0 + (np.arange(shape[1]) + 0.5) * CELL_M
         yy = y0 + (np.arange(shape[0]) + 0.5) * CELL_M
         mask = np.zeros(shape, bool)
@@ -247,10 +220,7 @@ def _is_closed(corners: F64) -> bool:
 
 
 def runs(room_of_column: Sequence[int]) -> Iterator[tuple[int, int, int]]:
-    """(room, first column, end column) of each stretch of columns of one room, -1 left out.
-
-    Stretches shorter than a least length are left out: nothing hangs there.
-    """
+    """(room, first column, end column) of long enough stretches of one room, -1 left out."""
     values = np.asarray(room_of_column)
     edges = np.flatnonzero(np.diff(values)) + 1
     for start, end in zip(np.r_[0, edges], np.r_[edges, len(values)], strict=True):

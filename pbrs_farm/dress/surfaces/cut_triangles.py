@@ -13,11 +13,7 @@ Ints = NDArray[np.int64]
 
 
 def cut_triangles(rows: F64, normal: F64, offset: float) -> tuple[F64, Ints]:
-    """Triangles none of which crosses the plane x . normal = offset, and the parent of each.
-
-    rows: (F, 3, K) corners whose first three columns are metres and the rest goes along. New
-    points are float32 values, the same for both triangles of an edge. Order is kept.
-    """
+    """Triangles (F, 3, K) cut at the plane x . normal = offset, in order, and each one's parent."""
     d = rows[..., :3] @ normal - offset
     side = np.where(np.abs(d) < _ON_PLANE_M, 0, np.sign(d)).astype(int)
     crosses = (side.min(1) < 0) & (side.max(1) > 0)

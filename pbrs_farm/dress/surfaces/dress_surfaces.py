@@ -1,7 +1,4 @@
-"""The pass `surfaces`: gives every room its floor, walls, ceiling and skirting boards.
-
-Effects: changes the house.
-"""
+"""The pass `surfaces`: gives every room of the house its floor, walls, ceiling and skirting boards."""
 
 from __future__ import annotations
 
@@ -48,11 +45,7 @@ _KEPT_SHARE = 0.1  # share of photographed floors and walls that are kept
 
 
 def room_frame(area: BaseGeometry) -> tuple[F64, F64]:
-    """(2,) a corner of the room in plan and (2, 2) unit rows along its longer and shorter side.
-
-    By the least rotated rectangle around the room, with a fixed sense, so that it does not depend
-    on where the outline begins. The world's axes for a room without an area.
-    """
+    """(2,) a corner in plan and (2, 2) unit rows of the least rectangle, sense fixed; or the world's axes."""
     if area.is_empty:
         return np.zeros(2), np.eye(2)
     box = shapely.get_coordinates(shapely.minimum_rotated_rectangle(area))[:4]

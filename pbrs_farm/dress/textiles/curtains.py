@@ -64,11 +64,7 @@ class WindowSide:
         return float(np.arctan2(self.inward[0], self.inward[2]))
 
     def bounds(self, x0: float, x1: float, y0: float, y1: float, out: float) -> tuple[F64, F64]:
-        """Low and high corner in the world of the box before the wall.
-
-        x0 and x1 along the window from its middle, y0 and y1 in the world, out from the wall: all
-        metres. The box begins 4 mm before the wall.
-        """
+        """Low and high corner of a box x0..x1 from the middle, world y0..y1, 4 mm to `out` before the wall."""
         ends = [
             self.origin + self.along * x + self.inward * z for x in (x0, x1) for z in (0.004, out)
         ]
@@ -80,10 +76,7 @@ class WindowSide:
 def window_side(
     house: MutableHouse, space: HouseSpace, room: RoomSpace, window: Passage
 ) -> WindowSide | None:
-    """The window from the room; None where it has cloth already or nothing fits before it.
-
-    None as well for a window narrower than 0.35 m, or of another room.
-    """
+    """The window from the room; None with cloth, below 0.35 m, without space, or of another room."""
     side = window.side_of(room.room.id)
     if side is None or window.width < 0.35:
         return None
@@ -121,11 +114,7 @@ def hang_curtains(
     cloth: Cloth,
     rng: np.random.Generator,
 ) -> bool:
-    """A rod and two panels; False, with its reason counted, where they do not fit.
-
-    Both panels or none. They are added to the house; the space does not follow and must be
-    asked anew.
-    """
+    """Add a rod and two panels (both or none); False, counted, if they do not fit. Ask the space anew."""
     window = side.window
     highest = side.ceiling_y - _UNDER_CEILING_M
     rod_y = highest if cloth.is_draped else min(window.top_y + _OVER_WINDOW_M, highest)
@@ -163,10 +152,7 @@ def _panel_place(
     out: float,
     house: MutableHouse,
 ) -> tuple[float, float, float] | None:
-    """x0, x1 across and the lowest y of a panel at one end of the window; None = no room.
-
-    spans: how much of the window it covers, and widths of wall beside it, tried in this order.
-    """
+    """x0, x1 and lowest y of a panel at one end; spans: of window and wall, tried in order; or None."""
     cover, widths = spans
     half = side.window.width / 2
     sill = side.window.bottom_y
@@ -212,11 +198,7 @@ def _is_opened_into(swept: Sequence[Swept], low: F64, high: F64) -> bool:
 
 
 def is_flat(free: BaseGeometry, side: WindowSide, x: float) -> bool:
-    """Whether the wall's face at x across the window is where it is at the window.
-
-    free is the plan area without walls. Ask it on both sides of the cloth, lest a rod
-    end in a corner.
-    """
+    """True if the wall's face at x is where it is at the window, as a rod's ends need; free: without walls."""
     position = side.origin + side.along * x
     before, behind = position + side.inward * _FLAT_M, position - side.inward * _FLAT_M
     return bool(

@@ -45,10 +45,7 @@ _LEAST_M, _MOST_M = 0.3, 6.0  # least and greatest side of a rug
 
 def rug(rng: np.random.Generator, width: float, length: float, style: Style,
     patterns: Sequence[str] = (), forms: Sequence[str] = _RUG_FORMS) -> Model:
-    """A rug with its length along x and its back at y = 0, of one of the patterns and forms.
-
-    Forms: what its edge is like; half is half of an oval.
-    """
+    """A rug along x, back at y = 0, of one of the patterns and forms (its edge; half is half an oval)."""
     patterns = patterns or content().rugs
     pattern, form = str(rng.choice(list(patterns))), str(rng.choice(list(forms)))
     # A border runs along straight sides, rings along round ones.
@@ -311,10 +308,7 @@ def _lay_largest(house: MutableHouse, space: HouseSpace, room: RoomSpace, style:
     rng: np.random.Generator, middle: F64, turn: float, sizes: list[tuple[float, float]], *,
     from_wall: float = _FROM_WALL_M, patterns: Sequence[str] = (),
     forms: Sequence[str] = _RUG_FORMS, bare: bool = False, at_doors: bool = False) -> bool:
-    """Lay the first size (width, length) that fits near the place; length goes across `turn`'s front.
-
-    bare: without furniture on it. at_doors: allowed where a door swings.
-    """
+    """Lay the first fitting size (width, length across the front) near the place. bare: off furniture."""
     free = shapely.buffer(shapely.difference(room.area, room.walls), -from_wall, join_style="mitre")
     taken = _floor_mats(house, space, room)
     if not at_doors:

@@ -134,10 +134,7 @@ def hang_anywhere(
     above_m: float = 0.05,
     tags: tuple[str, ...] = (),
 ) -> bool:
-    """Hang the item at a height, at a random place with depth_m free in front.
-
-    above_m: free height above it. False, with the reason counted, if there is no place.
-    """
+    """Hang the item at a height, at a random place free by depth_m and above_m; else False, counted."""
     piece, shape = model
     (x0, _y0, _z0), (x1, y1, _z1) = shape.bounds
     low, width = hanging.floor_y + low_m, float(x1 - x0)
@@ -191,10 +188,7 @@ def _draw_fitting(
     only: tuple[str, ...] = ("",),
     leave_out: tuple[str, ...] = (),
 ) -> Model | None:
-    """A socket or switch of the catalogue with a realistic size; None = generate one.
-
-    only, leave_out: words of a piece's name, in lower case.
-    """
+    """A socket or switch of realistic size, words of its name required or excluded; None = generate one."""
     fit = [
         p
         for p in catalogue.of(group)

@@ -67,10 +67,7 @@ def _is_at_a_bed(face: WallFace, s: float, width: float, beds: Sequence[F64]) ->
 
 
 def furnish_walls(house: MutableHouse, catalogue: Catalogue, style: Style, share: float) -> None:
-    """Hang mirrors, radiators, switches, coats, shelves, pictures, clocks, notes and sockets in the rooms of the house.
-
-    share: 0..1 of what a room would get.
-    """
+    """Hang a share of mirrors, radiators, switches, coats, shelves, pictures, clocks, notes and sockets."""
     space = house_space(house)
     is_heated = wants_radiators(house)
     gallery = Gallery(house, catalogue, style)

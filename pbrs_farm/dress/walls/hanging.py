@@ -92,11 +92,7 @@ class Hanging:
         tags: tuple[str, ...] = (),
         margin_m: float = 0.05,
     ) -> Item:
-        """Hang a piece on faces[face] and take its place; the item.
-
-        s: metres along the face, of the middle of its lower edge. low_y: world y of that edge. margin_m:
-        around it, that nothing else may hang in. Nothing is checked: ask `WallFace.starts` before.
-        """
+        """Hang a piece at s, low_y (its lower edge's middle) unchecked, and take its place and margin_m."""
         wall = self.faces[face]
         low, high = shape.bounds
         out = GAP_M - wall.recess_m(s + float(low[0]), s + float(high[0]))
@@ -141,10 +137,7 @@ class Hanging:
 
 
 def _clear_of_doors(face: WallFace, doors: Sequence[tuple[BaseGeometry, float]]) -> WallFace:
-    """The face without the area that a door's leaf would hit, below the door's top.
-
-    Flat items may extend up to the passage through the door.
-    """
+    """The face without the area, below its top, that a door's leaf would hit when opened."""
     columns = (np.arange(face.clear.shape[1]) + 0.5) * CELL_M
     clear = face.clear
     for area, top_y in doors:

@@ -80,10 +80,7 @@ class Print:
 
 
 class Gallery:
-    """The prints of a home, made on demand; state: those made so far.
-
-    Pictures of the catalogue for walls take precedence over generated ones.
-    """
+    """The prints of a home, the catalogue's or generated, made on demand."""
 
     def __init__(self, house: MutableHouse, catalogue: Catalogue, style: Style) -> None:
         self._rng = house.rng("prints")
@@ -95,10 +92,7 @@ class Gallery:
         self._families: Counter[str] = Counter()
 
     def print_for(self, aspect: float, besides: Collection[str] = ()) -> Print:
-        """A picture of about that width over height; new while there are few.
-
-        besides: ids of textures that hang beside it: another is taken where there is one.
-        """
+        """A picture of about that width over height, new while there are few, other than besides if possible."""
         if self._own or len(self._prints) < _MOST_PRINTS:
             pixels, family = self._new(aspect)
             r, g, b = (float(c) for c in pixels.reshape(-1, 3).mean(0) / 255)
