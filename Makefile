@@ -8,7 +8,7 @@ HOME_NAME ?= Studio
 # Processes of ours find their modules compiled: without that each takes a second of CPU more.
 unexport PYTHONDONTWRITEBYTECODE
 
-.PHONY: help setup demo lint check check-fast test test-all test-long test-oldest test-newest test-farm test-infra test-kube test-slow fuzz test-web test-sweethome3d test-study test-manual test-notebooks test-cuda gpu-check bench bench-all bench-cycles bench-farm dist image docs format clean
+.PHONY: help setup demo lint check check-fast test test-all test-long test-oldest test-newest test-farm test-infra test-kube test-slow fuzz test-web test-sweethome3d test-study test-manual test-notebooks test-cuda gpu-check bench bench-all bench-cycles bench-farm dist image docs docs-version format clean
 
 # Markers of the tests that need more than a CPU and the packages of `make setup` and `make test-all`.
 APART := not gpu and not infra and not kube and not sweethome3d and not notebooks and not pages
@@ -142,7 +142,7 @@ gpu-check: ## what an NVIDIA GPU does here, end to end: out/bench/gpu_tests.txt,
 bench: setup ## the short benches, five minutes; NAME=homes, or any of `python -m benchmarks --claims`, for one
 	@$(if $(filter study,$(NAME)),$(study-packages))
 	@$(if $(filter release,$(NAME)),$(call extra,build twine cyclonedx_py,release))
-	@$(if $(filter docs,$(NAME)),$(call extra,mkdocstrings material,docs))
+	@$(if $(filter docs,$(NAME)),$(call extra,mkdocstrings material mike,docs))
 	@$(if $(filter light,$(NAME)),$(call extra,flip_evaluator,bench))
 	@$(if $(filter cycles,$(NAME)),$(cycles-packages))
 	$(BIN)/python -m benchmarks $(NAME)
@@ -172,9 +172,15 @@ image: setup ## the Docker image (TARGET=gpu for the other): version from git, b
 	@bash scripts/image.sh
 
 docs: setup ## these docs as a site: out/site/index.html; ends at the first dead link
-	@$(call extra,mkdocstrings material,docs)
+	@$(call extra,mkdocstrings material mike,docs)
 	@NO_MKDOCS_2_WARNING=1 $(BIN)/mkdocs build --strict
 	@echo out/site/index.html
+
+docs-version: setup ## these docs as VERSION=0.1, beside earlier ones, on the local branch gh-pages; whoever publishes pushes it
+	@test -n "$(VERSION)" || { echo "docs-version: VERSION=0.1 names the version" >&2; exit 1; }
+	@$(call extra,mkdocstrings material mike,docs)
+	@PATH="$(CURDIR)/$(BIN):$$PATH" NO_MKDOCS_2_WARNING=1 mike deploy --update-aliases $(VERSION) latest
+	@$(BIN)/mike set-default --allow-undefined latest
 
 format: setup ## format and fix what can be fixed
 	$(BIN)/ruff format .
