@@ -10,8 +10,9 @@ import pytest
 from pbrs_farm.core import classes
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Material, MaterialKind, corners_of_surfaces
+from pbrs_farm.furnishings.things.families import family_pieces, family_shape
 from pbrs_farm.geometry.solids import box
-from pbrs_farm.home.masses import body_kg, weighed
+from pbrs_farm.home.masses import body_kg, surfaces_kg, weighed
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 
 WOOD, CLOTH = Material("oak wood"), Material("fabric pillow")
@@ -77,3 +78,15 @@ def test_a_name_gives_the_material_and_otherwise_the_class_does(
     # Half a millimetre is solid for every material.
     mass = body_kg([(solid((1.0, 0.0005, 1.0)), material)], nyu40)
     assert mass == pytest.approx(kg_m3 * 0.0005, rel=1e-5)
+
+
+def test_washing_machines_weigh_as_much_as_real_ones() -> None:
+    masses = [
+        surfaces_kg(shape.surfaces, shape.materials, 0)
+        for piece in family_pieces()
+        if piece.id.startswith("generated#washing_machine")
+        for shape in [family_shape(piece)]
+    ]
+    assert len(masses) > 20
+    assert min(masses) > 55
+    assert max(masses) < 80

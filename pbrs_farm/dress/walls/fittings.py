@@ -15,6 +15,7 @@ from pbrs_farm.dress.style import Rgb, Style, shade
 from pbrs_farm.dress.walls.hanging import WANTS, Hanging, faces_behind
 from pbrs_farm.dress.walls.hung_things import (
     CLOCK_RIMS,
+    PLATE_FORMS,
     SOCKET_FORMS,
     SWITCH_FORMS,
     clock,
@@ -90,7 +91,8 @@ def hang_clock(hanging: Hanging, style: Style, share: float) -> None:
     light = rng.random() < 0.75
     dial = jpeg_texture("dial", _dial(rng, (0.93, 0.92, 0.88) if light else (0.1, 0.1, 0.11)))
     diameter, form = float(rng.uniform(0.24, 0.36)), int(rng.integers(len(CLOCK_RIMS)))
-    hang_anywhere(hanging, clock(diameter, dial, frame, form), 1.85, 0.3, rng)
+    marks = int(rng.choice([0, 4, 12]))
+    hang_anywhere(hanging, clock(diameter, dial, frame, form, marks), 1.85, 0.3, rng)
 
 
 def _dial(rng: np.random.Generator, ground: Rgb) -> Srgb8Image:
@@ -158,10 +160,11 @@ def fit_switches(hanging: Hanging, catalogue: Catalogue, style: Style, share: fl
     colour = (0.9, 0.9, 0.88) if rng.random() < 0.8 else shade(style.metal.colour, 0.8)
     if rng.random() >= share:
         return
-    # All switches of a home are of one make.
+    # All switches of a home are of one make, all plates alike.
     form = int(hanging.house.rng("switches", "form").integers(SWITCH_FORMS))
+    plate = int(hanging.house.rng("switches", "plate").integers(PLATE_FORMS))
     switch = _draw_fitting(catalogue, "switch", rng) or content().things["wall_switch"](
-        rng, style, 1 + int(rng.random() < 0.35), colour, form
+        rng, style, 1 + int(rng.random() < 0.35), colour, form, plate
     )
     lit = 0
     for door in room.doors:
@@ -176,7 +179,7 @@ def fit_switches(hanging: Hanging, catalogue: Catalogue, style: Style, share: fl
         socket = _draw_fitting(catalogue, "socket", of_home, leave_out=_DATA_SOCKETS)
         if rng.random() < _DATA_SHARE:
             socket = _draw_fitting(catalogue, "socket", rng, only=_DATA_SOCKETS) or socket
-        socket = socket or content().things["wall_socket"](rng, style, n, colour, form)
+        socket = socket or content().things["wall_socket"](rng, style, n, colour, form, plate)
         hang_anywhere(hanging, socket, _SOCKET_M - 0.04, 0.05, rng)
 
 

@@ -222,8 +222,16 @@ def mirror(
         kind = str(rng.choice(list(_PROFILES)))
         frame_m *= 1.6 if kind in list(_PROFILES)[4:] else 1.0
         parts.append((ring("frame", low, high, frame_m, 0.024, kind), frame))
+        extra = str(rng.choice(["none", "blocks", "lip", "band"]))
+        if extra == "blocks":
+            parts += [(b, frame) for b in _corner_blocks(low, high, frame_m, 0.024)]
         low, high = low + frame_m, high - frame_m
         depth = 0.024 * _PROFILES[kind][-2][1] - 0.003
+        if extra in ("lip", "band"):
+            narrow, made_of = (0.005, chrome) if extra == "lip" else (0.03, frame)
+            profile = "round" if extra == "lip" else "square"
+            parts.append((ring(extra, low, high, narrow, depth + 0.002, profile), made_of))
+            low, high = low + narrow - 0.001, high - narrow + 0.001
     elif form == 1:
         half, y = np.array([0.008, 0.006, 0.004]), (0.005, height - 0.005)
         places = [(x * 0.3 * width, b, 0.005) for x in (-1, 1) for b in y]
@@ -237,8 +245,8 @@ def mirror(
     return hanging_piece("mirror", "mirror", MIRROR, parts)
 
 
-def clock(diameter: float, dial: Texture, frame: Material, form: int = 0) -> Model:
-    """A round wall clock with a printed dial, in one of CLOCK_RIMS."""
+def clock(diameter: float, dial: Texture, frame: Material, form: int = 0, marks: int = 0) -> Model:
+    """A round wall clock with a printed dial, in one of CLOCK_RIMS; marks: number of raised hours."""
     r = diameter / 2
     profile = [(r - inset, z) for inset, z in CLOCK_RIMS[form]]
     rim = content().facing_disc([(0, 0), *profile], r)
@@ -250,6 +258,12 @@ def clock(diameter: float, dial: Texture, frame: Material, form: int = 0) -> Mod
         (replace(rim, name="rim"), frame),
         (replace(face, uvs=uv.astype(np.float32)), _printed(dial, 0.4)),
     ]
+    for k in range(marks):
+        way = np.array([np.sin(2 * np.pi * k / marks), np.cos(2 * np.pi * k / marks), 0.0])
+        middle = way * (inner - 0.016) + (0.0, r, z + 0.0015)
+        half = np.array([0.004, 0.012, 0.002])
+        axes = np.array([[way[1], way[0], 0], [-way[0], way[1], 0], [0, 0, 1]])
+        parts.append((box("mark", middle, half, 0, axes=axes), frame))
     return hanging_piece("clock", "clock", OTHERPROP, parts, [dial])
 
 
@@ -267,6 +281,7 @@ def _printed(texture: Texture, roughness: float = 0.7) -> Material:
 CUPBOARD_FORMS: Final = 6
 SWITCH_FORMS: Final = 6
 SOCKET_FORMS: Final = 5  # national standards
+PLATE_FORMS: Final = 4
 CLOCK_RIMS: Final = (
     ((0.0, 0.0), (0.0, 0.035), (0.012, 0.035), (0.012, 0.024)),
     ((0.0, 0.0), (0.0, 0.02), (0.01, 0.03), (0.03, 0.036), (0.036, 0.024)),

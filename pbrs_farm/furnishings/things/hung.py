@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from itertools import product
+from itertools import pairwise, product
 from typing import Final
 
 import numpy as np
@@ -98,14 +98,19 @@ def wall_cupboard(m: Maker, body: Material, face: Material, width: float, height
 
 @thing(group="shelves", nyu40=SHELVES, place=Place.WALL)
 def open_cupboard(m: Maker, body: Material, width: float, height: float, d: float) -> None:
-    """An open cupboard of one to three shelves."""
-    w, t = width / 2, 0.018
+    """An open cupboard of one to three shelves, some with an upright board or rails in front."""
+    w, t, form = width / 2, 0.018, m.pick("plain", "divided", "railed")
     with m.of(body):
         m.box(t, height, (0.0, d), left=-w)
         m.box((w - t, w), height, (0.0, d))
         m.box(2 * w - 2 * t, height, (0.0, 0.006))
-        for y in spaced(0.0, height - t, max(1, round(height / 0.3)) + 1):
+        levels = spaced(0.0, height - t, max(1, round(height / 0.3)) + 1)
+        for y in levels:
             m.box(2 * w - 2 * t, t, (0.006, d), on=y)
+        for low, high in pairwise(levels) if form == "divided" and width > 0.4 else ():
+            m.box(t, (low + t, high), (0.006, d - 0.01))
+    for y in levels[:-1] if form == "railed" else ():
+        m.rod((t - w, w - t), y + t + 0.03, d - 0.012, 0.004, of=m.metal)
 
 
 @thing(group="kitchen_tool", place=Place.WALL)
@@ -175,7 +180,7 @@ def hung_cup(m: Maker, x: float, y: float) -> None:
 
 
 @thing(group="socket", place=Place.WALL)
-def wall_socket(m: Maker, n: int, colour: Rgb, form: int) -> None:
+def wall_socket(m: Maker, n: int, colour: Rgb, form: int, plate: int) -> None:
     """Sockets of the usual 8 cm beside one another, by national standard.
 
     A round well, one with a pin, slots below a rocker, two pairs of slots, three holes in a row.
@@ -183,7 +188,7 @@ def wall_socket(m: Maker, n: int, colour: Rgb, form: int) -> None:
     hole = plain("plate hole", shade(colour, 0.25), 0.5)
     xs = [(k - (n - 1) / 2) * 0.081 for k in range(n)]
     with m.of(plain("plate", colour, 0.3)):
-        cover(m, n, 0.115 if form == 3 else 0.081)
+        cover(m, n, plate, 0.115 if form == 3 else 0.081)
         for x in xs if form == 2 else ():
             m.box(0.012, (0.05, 0.07), (0.0085, 0.0125), x=x + 0.022, name="rocker")
     for x in xs:
@@ -197,13 +202,13 @@ def wall_socket(m: Maker, n: int, colour: Rgb, form: int) -> None:
 
 
 @thing(group="switch", place=Place.WALL)
-def wall_switch(m: Maker, n: int, colour: Rgb, form: int) -> None:
+def wall_switch(m: Maker, n: int, colour: Rgb, form: int, plate: int) -> None:
     """Switches of the usual 8 cm beside one another.
 
     Rockers, halved ones, small ones in a plate, round ones that turn.
     """
     with m.of(plain("plate", colour, 0.3)):
-        cover(m, n)
+        cover(m, n, plate)
         for k in range(n):
             x = (k - (n - 1) / 2) * 0.081
             match form:
@@ -229,9 +234,20 @@ def wall_switch(m: Maker, n: int, colour: Rgb, form: int) -> None:
                 m.box(0.006, 0.006, (0.0088, 0.0104), on=y - 0.003, name="screw")
 
 
-def cover(m: Maker, n: int, tall: float = 0.081) -> None:
-    """The plate of n switches or sockets side by side."""
-    m.box(0.081 * n, tall, (0.0, 0.009), name="plate")
+def cover(m: Maker, n: int, form: int, tall: float = 0.081) -> None:
+    """The plate of n switches or sockets side by side: plain, rounded, in two steps, one for each."""
+    match form:
+        case 0:
+            m.box(0.081 * n, tall, (0.0, 0.009), name="plate")
+        case 1:
+            m.box(0.081 * n, tall, (0.0, 0.009), 0.003, name="plate")
+        case 2:
+            m.box(0.081 * n, tall, (0.0, 0.004), name="plate")
+            m.box(0.081 * n - 0.006, (0.003, tall - 0.003), (0.004, 0.009), name="plate")
+        case _:
+            for k in range(n):
+                m.box(0.0795, tall, (0.0, 0.009), 0.0015, x=(k - (n - 1) / 2) * 0.081, name="plate")
+            m.box(0.081 * n, (0.001, tall - 0.001), (0.0, 0.006), name="plate")
 
 
 @thing(group="mirror", nyu40=MIRROR, place=Place.WALL)
@@ -240,7 +256,7 @@ def round_mirror(m: Maker, diameter: float, frame: Material) -> None:
     form = m.pick("ring", "ring", "wide", "bead", "bare", "rays")
     r = diameter / 2 * (0.7 if form == "rays" else 1.0)
     y, t = diameter / 2, {"wide": 0.045, "bare": 0.002}.get(form, 0.014)
-    rim = {"bead": [(r, 0.0), (r, 0.012), (r - 0.003, 0.019), (r - 0.007, 0.021),
+    rim = {"bare": [(r, 0.0), (r, 0.012), (r - t, 0.012)], "bead": [(r, 0.0), (r, 0.012), (r - 0.003, 0.019), (r - 0.007, 0.021),
         (r - 0.011, 0.019), (r - t, 0.012)], "wide": [(r, 0.0), (r, 0.014), (r - 0.006, 0.022),
         (r - t + 0.006, 0.016), (r - t, 0.012)]}.get(form, [(r, 0.0), (r, 0.02), (r - t, 0.02), (r - t, 0.012)])
     m.add(facing_disc([(0, 0), *rim], y), name="rim", of=frame)
@@ -249,6 +265,10 @@ def round_mirror(m: Maker, diameter: float, frame: Material) -> None:
     for k in range(rays):
         with m.moved(turn=rotation_z(2 * np.pi * k / rays), at=(0.0, y, 0.0)):
             m.box(0.008, (r - 0.004, y * (0.86 if k % 2 else 1.0)), (0.004, 0.012), of=frame)
+    if form not in ("rays", "bare") and m.chance(0.35):  # on a strap
+        for s in (-1.0, 1.0):
+            m.tube([(0.7 * s * r, y + 0.7 * r, 0.006), (0.0, y + 1.25 * r, 0.006)], 0.004, n=6, of=frame)
+        m.add(facing_disc([(0.012, 0.0), (0.012, 0.02), (0, 0.022)], y + 1.25 * r), name="peg", of=frame)
 
 
 @thing(group="pin_board", nyu40=WHITEBOARD, place=Place.WALL)

@@ -214,16 +214,18 @@ def door_front(m: Maker, look: Look, x: Pair, y: Pair, z: float, opens_left: boo
         pull(m, look.pull, a, b, z + 0.019, False, long, look.pull_material)
 
 
-def drawer_front(m: Maker, look: Look, x: Pair, y: Pair, z: float) -> None:
-    """The front of a drawer or flap with its pull, or two on wide ones."""
+def drawer_front(m: Maker, look: Look, x: Pair, y: Pair, z: float, hangs: bool = False) -> None:
+    """The front of a drawer or flap with its pull, or two on wide ones; hangs: its hinges are above."""
     wide, tall = x[1] - x[0], y[1] - y[0]
     # Low drawers are flat where doors have a frame.
     is_flat = (tall < 0.17 and look.kind != "grooved") or look.kind == "glazed"
     panel(m, "flat" if is_flat else look.kind, x, y, z, look.front)
-    middle, high, long = ((x[0] + x[1]) / 2, y[1] - 0.045 if tall > 0.2 else (y[0] + y[1]) / 2,
+    end = y[0] + 0.045 if hangs else y[1] - 0.045
+    middle, high, long = ((x[0] + x[1]) / 2, end if tall > 0.2 else (y[0] + y[1]) / 2,
         min(0.16 if wide < 0.5 else 0.24, 0.5 * wide))
     if look.pull == "edge":
-        pull(m, "edge", middle, y[1] - 0.004, z + 0.012, True, 0.7 * wide, look.pull_material)
+        pull(m, "edge", middle, y[0] if hangs else y[1] - 0.004, z + 0.012, True, 0.7 * wide,
+            look.pull_material)
     elif look.pull in ("knob", "disc", "ring") and wide > 0.6:
         for s in (-0.25, 0.25):
             pull(m, look.pull, middle + s * wide, high, z + 0.019, True, long, look.pull_material)
@@ -256,7 +258,8 @@ def fronts_of(m: Maker, look: Look, x: Pair, y: Pair, z: float, columns: Sequenc
                 if kind == "door":
                     door_front(m, look, (a, b), (c, d), z, is_left, is_high)
                 else:
-                    drawer_front(m, look, (a, b), (c, d), z)
+                    hangs = is_high and not is_drawer(kind, (c, d))
+                    drawer_front(m, look, (a, b), (c, d), z, hangs)
                 if is_drawer(kind, (c, d)):
                     drawer_box(m, space, (c, d), (inside.back, z), look.body, inside.top)
                 if add_to is not None:

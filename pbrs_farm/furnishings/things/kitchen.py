@@ -770,6 +770,10 @@ def washing_machine(m: Maker, size: Size) -> None:
     drum = min(0.24, hw - 0.03, y - foot - 0.02, h - 0.05 - y)
     m.vessel([(0.0, 0.0), (drum, 0.0), (drum, d - 0.12), (r - 0.052, d - 0.09)], 0.004, n=36,
         turn=LYING_ALONG_Z, at=(x, y, f - 0.003 - (d - 0.09)), of=STEEL)
+    # Counterweights, above the drum behind the drawer and below the drum.
+    with m.of(plain("concrete", (0.5, 0.5, 0.5), 0.9)):
+        m.box(0.42, (y + drum + 0.015, y + drum + 0.115), (0.03 - d / 2, 0.21 - d / 2))
+        m.box(0.3, (foot + 0.012, foot + 0.062), (0.05 - d / 2, 0.35 - d / 2))
     with m.hinged("door", at=(x - r, y, f + 0.018), axis=(0.0, -1.0, 0.0), upper_rad=_MACHINE_RAD):
         with m.moved(at=(x, y, f), turn=LYING_ALONG_Z):
             m.revolve([(r - 0.045, 0.0), (r, 0.0), (r, 0.018), (r - 0.012, 0.03), (r - 0.04, 0.026),

@@ -63,8 +63,8 @@ def _named(mutable: MutableHouse, name: str) -> list[Item]:
         (hung.pin_board, (0.8, 0.5, Material("frame"))), (hung.tool_rail, (0.9,)), (radiators.towel_radiator, ()),
         *((hung.wall_cupboard, (Material("body"), Material("front"), 0.8, 0.6, 0.3, 2, n)) for n in range(6)),
         (hung.open_cupboard, (Material("body"), 0.8, 0.6, 0.3)),
-        *((hung.wall_switch, (2, (0.9, 0.9, 0.9), n)) for n in range(hung_things.SWITCH_FORMS)),
-        *((hung.wall_socket, (2, (0.9, 0.9, 0.9), n)) for n in range(hung_things.SOCKET_FORMS)),
+        *((hung.wall_switch, (2, (0.9, 0.9, 0.9), n, n % 4)) for n in range(hung_things.SWITCH_FORMS)),
+        *((hung.wall_socket, (2, (0.9, 0.9, 0.9), n, n % 4)) for n in range(hung_things.SOCKET_FORMS)),
     ],
 )  # fmt: skip
 def test_wall_items_begin_at_their_wall_and_face_outwards(
