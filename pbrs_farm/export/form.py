@@ -202,6 +202,12 @@ def views_with_picture(views: list[ChosenView]) -> list[ChosenView]:
     return shown
 
 
+def write_file(file: Path, data: bytes) -> None:
+    """Write a file and the folders above it."""
+    file.parent.mkdir(parents=True, exist_ok=True)
+    file.write_bytes(data)
+
+
 def name_left_out(out: Path, views: list[ChosenView], why: str) -> None:
     """Write left_out.txt, `<house>/<view>: <why>` a line, unless there are no views.
 

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from pbrs_farm.core.arrays import F32
+from pbrs_farm.core.arrays import F32, Bools
 from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.lighting import GROUPS_OF_MODE, Group, Mode
 from pbrs_farm.core.resampling import resized_by_area
@@ -47,6 +47,21 @@ def intrinsic_layers(view: ChosenView) -> tuple[F32, F32, F32] | None:
     albedo = linear_from_srgb(view.array(names[0]) / 255).astype(np.float32)
     shading, residual = (np.asarray(view.array(name), np.float32) for name in names[1:])
     return albedo, shading, residual
+
+
+def material_planes(view: ChosenView) -> dict[str, F32]:
+    """Channel -> (H, W): R roughness, G metallic, B 0, as in InteriorVerse."""
+    rough, metallic = (np.float32(1 / 255) * view.array(n) for n in ("roughness", "metallic"))
+    return {"R": rough, "G": metallic, "B": np.zeros_like(rough)}
+
+
+def opaque_pixels(view: ChosenView) -> Bools:
+    """(H, W) pixels with a surface that is neither glass nor a mirror, as far as the view has these layers."""
+    counts = np.asarray(view.array("valid") > 0)
+    for clear in ("glass", "mirror"):
+        if view.has(clear):
+            counts &= view.array(clear) == 0
+    return counts
 
 
 def parts_without_negatives(view: ChosenView) -> tuple[F32, F32, F32] | None:

@@ -4,13 +4,16 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
+from fractions import Fraction
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.chosen_view import ChosenView
+from pbrs_farm.formats.film_mp4 import film_pace
 
 _SAME_ROWS: Final = 1e-6  # tolerance of two cameras' rotations, and metres
 
@@ -61,6 +64,30 @@ def frames_by_house(views: Sequence[ChosenView]) -> dict[str, list[SequenceFrame
         return float(frame.first.facts.get("frame", float("inf"))), frame.first.id
 
     return {house: sorted(moments, key=order) for house, moments in frames.items()}
+
+
+def films_of(
+    views: Sequence[ChosenView],
+) -> tuple[dict[tuple[str, str], list[ChosenView]], list[ChosenView]]:
+    """(House, camera of a rig, "" for its first) -> the frames of a film in order; and the other views."""
+    films: dict[tuple[str, str], list[ChosenView]] = {}
+    for view in views:
+        if view.facts.get("frame") is not None:
+            films.setdefault((view.house.id, view.shot.eye), []).append(view)
+    for frames in films.values():
+        frames.sort(key=lambda view: int(view.facts["frame"]))
+    return films, [view for view in views if view.facts.get("frame") is None]
+
+
+def pace_of(frames: Sequence[ChosenView]) -> Fraction:
+    """Frames a second of a film."""
+    ends = [(int(v.facts["frame"]), float(v.facts["time_s"])) for v in (frames[0], frames[-1])]
+    return film_pace(*ends)
+
+
+def picture_of(view: ChosenView, form: str) -> NDArray[np.uint8]:
+    """(H, W, 3) the view's picture; BadInput as `required_picture`."""
+    return np.asarray(view.array(required_picture(view, form))[..., :3], np.uint8)
 
 
 def pose_opencv(view: ChosenView) -> F64:

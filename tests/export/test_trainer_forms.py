@@ -6,6 +6,7 @@ They use no code of the package: their results are compared with the stored laye
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import numpy as np
@@ -275,3 +276,148 @@ def test_nerfstudios_normals_and_linear_pictures(stills: Path, tmp_path: Path) -
     # The picture of this view is OpenGL's, so all its light counts.
     picture = np.stack([planes[c] for c in "RGB"], -1)
     np.testing.assert_allclose(picture, light.sum(0), rtol=1e-6)
+
+
+def interiorverse(root: Path, split: str) -> list[tuple[str, dict[str, np.ndarray]]]:
+    """The samples of a list: three channels of all but the mask; other paths replace `_im` by the layer's name."""
+    samples = []
+    for scene in (root / f"{split}.txt").read_text().split():
+        for file in sorted((root / scene).glob("*_im.exr")):
+            sample = {}
+            for name in ("im", "albedo", "material", "normal", "depth", "mask"):
+                data = Path(str(file).replace("_im", f"_{name}")).read_bytes()
+                planes = layers_from_exr(data)
+                channels = "Y" if name == "mask" else "RGB"
+                assert sorted(planes) == sorted(channels)
+                sample[name] = np.stack([planes[c] for c in channels], -1)
+            samples.append((f"{Path(scene).name}/{file.stem[:-3]}", sample))
+    return samples
+
+
+@pytest.fixture
+def materials(stills: Path, tmp_path: Path) -> Path:
+    """The stills with albedo, roughness, metal and a mirror; the first has traced light, too."""
+    folder = Path(shutil.copytree(stills, tmp_path / "materials"))
+    rng = np.random.default_rng(5)
+    for k, view in enumerate(views_of(folder)):
+        shape = stored(view, "depth").shape
+        colours = rng.integers(0, 256, (*shape, 3)).astype(np.uint8)
+        (view.folder / "albedo.png").write_bytes(png_from_array(colours))
+        for name in ("roughness", "metallic", "mirror"):
+            grey = rng.integers(0, 2, shape).astype(np.uint8) * 255
+            (view.folder / f"{name}.png").write_bytes(png_from_array(grey))
+        if k == 0:
+            light = rng.random((2, *shape, 3), np.float32)
+            images = {"outdoor": light[0], "indoor": light[1], "albedo": light[0]}
+            images["normal"] = light[0]
+            (view.folder / "radiance.exr").write_bytes(radiance_exr(images))
+            (view.folder / "mlt_il_ol.png").write_bytes(png_from_array(colours))
+            facts = json.loads((view.folder / "view.json").read_text())
+            develop = {"mlt_il_ol": {"gains": [1.0, 0.5, 2.0], "exposure": 0.25}}
+            facts["modes"] = {"develop": {"denoised": False} | develop}
+            (view.folder / "view.json").write_text(json.dumps(facts))
+            np.save(tmp_path / "light.npy", light.sum(0) * [0.25, 0.125, 0.5])
+    return folder
+
+
+@pytest.mark.parametrize("split", ["train", ""])
+def test_interiorverse_reads_light_materials_and_geometry(
+    materials: Path, tmp_path: Path, split: str
+) -> None:
+    shares = SplitShares(1, 0, 0) if split else None
+    export(materials, tmp_path / "set", "interiorverse", shares=shares)
+    folder = tmp_path / "set" / split
+    lines = [line.split(",") for line in (folder / "index.csv").read_text().splitlines()[1:]]
+    samples = dict(interiorverse(tmp_path / "set", "train"))
+    assert len(samples) == len(lines) == 2
+    for k, (scene, number, _house, name) in enumerate(lines):
+        sample, view = samples[f"{scene}/{number}"], of_name(materials)[name]
+        if k == 0:
+            np.testing.assert_allclose(sample["im"], np.load(tmp_path / "light.npy"), rtol=1e-5)
+        else:
+            srgb = stored(view, "opengl_dl") / 255
+            linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+            np.testing.assert_allclose(sample["im"], linear, atol=1e-6)
+        srgb = stored(view, "albedo") / 255
+        linear = np.where(srgb <= 0.04045, srgb / 12.92, ((srgb + 0.055) / 1.055) ** 2.4)
+        np.testing.assert_allclose(sample["albedo"], linear, atol=1e-6)
+        for channel, layer in enumerate(("roughness", "metallic")):
+            np.testing.assert_allclose(sample["material"][..., channel] * 255, stored(view, layer))
+        valid, millimetres = stored(view, "valid") > 0, stored(view, "depth")
+        opaque = valid & (stored(view, "mirror") == 0)
+        np.testing.assert_array_equal(sample["mask"][..., 0] > 0.5, opaque)
+        depth = sample["depth"]
+        assert (depth == depth[..., :1]).all()
+        unknown = (millimetres == 0) | (millimetres == 65535)
+        np.testing.assert_array_equal(np.isinf(depth[..., 0]), unknown)
+        np.testing.assert_allclose(depth[~unknown][:, 0], millimetres[~unknown])
+        right, forward, up = np.moveaxis(stored(view, "normal") * (2 / 65535) - 1, -1, 0)
+        expected = np.stack([right, up, -forward], axis=-1)
+        np.testing.assert_allclose(sample["normal"][valid], expected[valid], atol=1e-4)
+
+
+def test_interiorverse_needs_materials(stills: Path, tmp_path: Path) -> None:
+    with pytest.raises(BadInput, match="no view has a picture and materials"):
+        export(stills, tmp_path / "x", "interiorverse")
+
+
+def film_of(file: Path) -> np.ndarray:
+    """(T, H, W, 3) the frames of an mp4."""
+    import av
+
+    with av.open(str(file)) as container:
+        return np.stack([frame.to_ndarray(format="rgb24") for frame in container.decode(video=0)])
+
+
+def test_cosmos_reads_films_controls_and_captions(root: Path, tmp_path: Path) -> None:
+    export(root, tmp_path / "set", "cosmos")
+    names = of_name(root)
+    for control in ("depth", "seg"):
+        lines = (tmp_path / f"set/{control}.jsonl").read_text().splitlines()
+        rows = [json.loads(line) for line in lines]
+        assert len(rows) == 2
+        for row in rows:
+            assert (row["width"], row["height"], row["nb_frames"], row["framerate"]) == (
+                64,
+                48,
+                3,
+                5,
+            )
+            assert row["duration"] == pytest.approx(0.6)
+            assert row["control_type"] == control
+            (window,) = row["t2w_windows"]
+            assert (window["start_frame"], window["end_frame"]) == (0, 2)
+            assert window["caption"].startswith("The picture shows ")
+            eye = "_right" if row["uuid"].endswith("_right") else ""
+            views = [names[f"frame_{k:05d}{eye}"] for k in range(3)]
+            pictures = film_of(tmp_path / "set" / row["vision_path"])
+            controls = film_of(tmp_path / "set" / row["control_path"])
+            assert pictures.shape == controls.shape == (3, 48, 64, 3)
+            expected = np.stack([stored(view, "opengl_dl") for view in views]).astype(int)
+            assert np.abs(pictures - expected).mean() < 6
+            if control == "depth":
+                metres = np.stack([stored(view, "depth_z") for view in views])
+                near = metres[metres > 0].min()
+                bright = np.where(metres > 0, near / np.where(metres > 0, metres, 1), 0) * 255
+                assert np.abs(controls.mean(-1) - bright).mean() < 3
+            else:
+                # An item has one colour in all frames.
+                ids = np.stack([stored(view, "instance") for view in views])
+                common = np.bincount(ids[ids > 0]).argmax()
+                colours = [np.median(controls[k][ids[k] == common], 0) for k in range(3)]
+                assert np.ptp(colours, axis=0).max() < 12
+    remarks = remarks_of(tmp_path / "set")
+    assert remarks[0] == "its loader drops films below 61 frames or over 61 s:"
+    assert "3 frames of 0.6 s" in remarks[1]
+
+
+def test_cosmos_cuts_long_films_into_windows() -> None:
+    from pbrs_farm.export.forms.cosmos import window_starts
+
+    for n in (61, 100, 121, 122, 300):
+        starts = window_starts(n)
+        lengths = np.diff(starts)
+        assert (starts[0], starts[-1]) == (0, n)
+        assert lengths.min() >= 61
+        assert lengths.max() <= 121
+    assert window_starts(10) == [0, 10]

@@ -275,7 +275,7 @@ FORM = ViewForm(
     "poses of placed models in the layout of the BOP challenge: `models/obj_<6 digits>.ply` and"
     " `models_info.json` in mm, `camera.json`, `train_pbr/<scene>/` with `rgb`, `depth`, `mask`,"
     " `mask_visib`, `scene_camera.json`, `scene_gt.json`, `scene_gt_info.json`,"
-    " `scene_gt_coco.json`; a scene is a home; (0, 0) of K is the centre of the first pixel",
+    " `scene_gt_coco.json`; a scene is a home",
     lenses=("pinhole",),
     convention=Convention(
         0, axes="camera x right, y down, z forward; mm", depth="mm, along the axis"

@@ -24,8 +24,8 @@ from pbrs_farm.export.chosen_view import (
     k_of_whole_centres,
     require_lens,
 )
-from pbrs_farm.export.form import REMARKS, Convention, ViewForm, name_left_out
-from pbrs_farm.export.sequences import frames_by_house, pose_opencv, required_picture
+from pbrs_farm.export.form import REMARKS, Convention, ViewForm, name_left_out, write_file
+from pbrs_farm.export.sequences import frames_by_house, picture_of, pose_opencv
 from pbrs_farm.images import jpeg_from_array, png_from_array
 
 _QUALITY: Final = 95  # of JPEG
@@ -52,15 +52,15 @@ def write_fsd(views: list[ChosenView], out: Path, _choice: Choice) -> None:
             require_lens(left, "fsd", *FORM.lenses)
             name = f"{number:04d}"
             for side, view in (("left", left), ("right", right)):
-                picture = view.array(required_picture(view, "fsd"))
-                _write(folder / side / f"rgb/{name}.jpg", jpeg_from_array(picture, _QUALITY))
+                picture = picture_of(view, "fsd")
+                write_file(folder / side / f"rgb/{name}.jpg", jpeg_from_array(picture, _QUALITY))
                 written.add((house, view.id))
             baseline_m = float(np.linalg.norm((pose_opencv(right) - pose_opencv(left))[:3, 3]))
             is_coarse |= not left.has("depth_z")
             png = png_from_array(digits_of_disparity(_disparity(left, baseline_m)))
-            _write(folder / f"left/disparity/{name}.png", png)
+            write_file(folder / f"left/disparity/{name}.png", png)
             k = " ".join(f"{v:.9g}" for row in k_of_whole_centres(left.facts["K"]) for v in row)
-            _write(folder / f"left/intrinsics/{name}.txt", f"{k}\n{baseline_m:.9g}\n".encode())
+            write_file(folder / f"left/intrinsics/{name}.txt", f"{k}\n{baseline_m:.9g}\n".encode())
             rows.append(f"{house}/dataset/data {name} {house} {left.id}\n")
     if not rows:
         raise BadInput("--to", "fsd", "no view has a right one", hint=_HINT)
@@ -70,11 +70,6 @@ def write_fsd(views: list[ChosenView], out: Path, _choice: Choice) -> None:
         (out / REMARKS).write_text(text, "utf-8")
     single = [view for view in views if (view.house.id, view.id) not in written]
     name_left_out(out, single, "has no right view")
-
-
-def _write(file: Path, data: bytes) -> None:
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_bytes(data)
 
 
 def _disparity(view: ChosenView, baseline_m: float) -> F64:

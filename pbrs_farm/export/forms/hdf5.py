@@ -85,9 +85,8 @@ def _blenderproc_normals(png: NDArray[Any], valid: NDArray[np.bool_]) -> NDArray
 FORM = ViewForm(
     "hdf5",
     write_hdf5,
-    "`<n>.hdf5` per view with BlenderProc's keys: `colors`, `depth`, `normals` ((n + 1) / 2, OpenGL"
-    " camera axes), `category_id_segmaps`, `instance_segmaps`, `instance_attribute_maps`, `campose`"
-    " ((0, 0) of its `cam_K` is the centre of the first pixel: cx = (W - 1) / 2); `index.jsonl`",
+    "`<n>.hdf5` per view with BlenderProc's keys: `colors`, `depth`, `normals` ((n + 1) / 2),"
+    " `category_id_segmaps`, `instance_segmaps`, `instance_attribute_maps`, `campose` (with `cam_K`); `index.jsonl`",
     has_classes=True,
     convention=Convention(
         0,

@@ -28,7 +28,7 @@ from pbrs_farm.export.chosen_view import (
     opengl_normals,
     require_lens,
 )
-from pbrs_farm.export.form import Convention, ViewForm
+from pbrs_farm.export.form import Convention, ViewForm, write_file
 from pbrs_farm.export.intrinsic_parts import parts_without_negatives, picture_radiance
 from pbrs_farm.export.sequences import pose_opencv
 from pbrs_farm.formats import hypersim
@@ -109,8 +109,7 @@ def _write_scene(
             for (part, name), array in files.items():
                 file = folder / hypersim.frame_file(camera, frame, part, name)
                 if isinstance(array, bytes):
-                    file.parent.mkdir(parents=True, exist_ok=True)
-                    file.write_bytes(array)
+                    write_file(file, array)
                 else:
                     hypersim.write_dataset(file, array)
             place: dict[str, Any] = {"scene_name": scene, "camera_name": camera, "frame_id": frame}

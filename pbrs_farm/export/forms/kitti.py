@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.chosen_view import Choice, ChosenView, k_of_whole_centres, require_lens
-from pbrs_farm.export.form import Convention, ViewForm
+from pbrs_farm.export.form import Convention, ViewForm, write_file
 from pbrs_farm.export.sequences import SequenceFrame, frames_by_house, required_picture
 from pbrs_farm.images import png_from_array
 
@@ -35,9 +35,7 @@ def write_kitti(views: list[ChosenView], out: Path, _choice: Choice) -> None:
             files |= _pictures(frame, "10") | (_pictures(following, "11") if following else {})
             files["calib/{}.txt"] = _calibration(frame).encode()
             for name, data in files.items():
-                target = out / name.format(number)
-                target.parent.mkdir(parents=True, exist_ok=True)
-                target.write_bytes(data)
+                write_file(out / name.format(number), data)
             rows.append(f"{number} {house} {frame.first.id}")
     if not rows:
         hint = "run with --stereo 0.065 --layers disparity occlusion_stereo flow_forward"
@@ -108,8 +106,7 @@ def _projection(name: str, k: NDArray[np.float64], baseline_m: float) -> str:
 FORM = ViewForm(
     "kitti",
     write_kitti,
-    "KITTI 2015: `image_2`, `image_3`, `disp_occ_0`, `disp_noc_0`, `flow_occ`, `flow_noc`, `calib`"
-    " ((0, 0) of P2 and P3 is the centre of the first pixel)",
+    "KITTI 2015: `image_2`, `image_3`, `disp_occ_0`, `disp_noc_0`, `flow_occ`, `flow_noc`, `calib`",
     lenses=("pinhole",),
     layers=("disparity", "flow_forward"),
     convention=Convention(

@@ -27,7 +27,7 @@ from pbrs_farm.export.chosen_view import (
     require_lens,
 )
 from pbrs_farm.export.form import REMARKS, Convention, ViewForm, name_left_out, views_with_picture
-from pbrs_farm.export.intrinsic_parts import intrinsic_layers
+from pbrs_farm.export.intrinsic_parts import intrinsic_layers, material_planes, opaque_pixels
 from pbrs_farm.images import exr_from_layers, png_from_array
 
 _LISTS: Final = {
@@ -97,14 +97,8 @@ def _write_appearance(view: ChosenView, out: Path) -> list[str]:
     parts = "albedo_{}.png", "material_{}.exr", "mask_{}.png"
     files = [f"{view.house.id}/{part.format(view.id)}" for part in parts]
     (out / files[0]).write_bytes(view.data("albedo"))
-    rough, metallic = (np.float32(1 / 255) * view.array(n) for n in ("roughness", "metallic"))
-    planes = {"R": rough, "G": metallic, "B": np.zeros_like(rough)}
-    (out / files[1]).write_bytes(exr_from_layers(planes, half=True))
-    counts = view.array("valid") > 0
-    for clear in ("glass", "mirror"):
-        if view.has(clear):
-            counts &= view.array(clear) == 0
-    mask = np.where(counts[..., None], np.uint8(255), np.zeros(3, np.uint8))
+    (out / files[1]).write_bytes(exr_from_layers(material_planes(view), half=True))
+    mask = np.where(opaque_pixels(view)[..., None], np.uint8(255), np.zeros(3, np.uint8))
     (out / files[2]).write_bytes(png_from_array(mask))
     return files
 
@@ -121,11 +115,9 @@ def name_lists_by_split(out: Path, splits: tuple[str, ...], _choice: Choice) -> 
 FORM = ViewForm(
     "marigold",
     write_marigold,
-    "`<house>/rgb_<view>.png`, `depth_<view>.png` (uint16 mm), `normal_<view>.npy` (float32, x right, y up,"
-    " z towards the camera) and lists of them, `filename_list.txt` (`rgb depth`) and"
-    " `filename_list_normals.txt` (`rgb normal`); of views with `albedo`, `shading`, `residual` `filename_list_iid_lighting.txt`"
-    " (`rgb albedo shading residual`, the layers as float32 npy, linear; Marigold's loader clips negative residual), with `albedo`, `roughness`, `metallic` `filename_list_iid_appearance.txt`"
-    " (`rgb albedo material mask`, sRGB PNG, EXR of roughness and metallic, PNG without glass and mirrors); with `--split` `train/filename_list_train.txt`",
+    "`<house>/rgb_<view>.png`, `depth_<view>.png` (uint16 mm), `normal_<view>.npy` (float32) and lists of them,"
+    " `filename_list.txt` (`rgb depth`), `filename_list_normals.txt` (`rgb normal`); of views with `albedo`, `shading`, `residual` `filename_list_iid_lighting.txt`,"
+    " with `albedo`, `roughness`, `metallic` `filename_list_iid_appearance.txt`; with `--split` `train/filename_list_train.txt`",
     finish=name_lists_by_split,
     lenses=("pinhole", "radtan"),
     convention=Convention(

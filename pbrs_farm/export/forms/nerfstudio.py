@@ -18,7 +18,7 @@ from pbrs_farm.export.chosen_view import (
     opengl_normals_png,
     require_lens,
 )
-from pbrs_farm.export.form import Convention, ViewForm
+from pbrs_farm.export.form import Convention, ViewForm, write_file
 from pbrs_farm.export.intrinsic_parts import picture_radiance
 from pbrs_farm.export.sequences import required_picture
 from pbrs_farm.images import exr_from_layers, png_from_array
@@ -106,8 +106,7 @@ def _frame(view: ChosenView, folder: Path) -> dict[str, Any]:
     if facts.get("time_s") is not None:
         row["time"] = facts["time_s"]
     for name, data in files.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(data)
+        write_file(folder / name, data)
     return row
 
 

@@ -14,7 +14,6 @@ from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
 
@@ -24,9 +23,8 @@ from pbrs_farm.export.forms.coco import annotations_of, categories_of
 from pbrs_farm.export.questions.asking import DATASET, Asker, Question, blind_scores
 from pbrs_farm.export.questions.clips import Clip, clips_of
 from pbrs_farm.export.questions.references import Reference, references_of
-from pbrs_farm.export.sequences import required_picture
-from pbrs_farm.formats.film_mp4 import film, film_pace
-from pbrs_farm.formats.layer_file import layer_from_bytes
+from pbrs_farm.export.sequences import pace_of, picture_of, required_picture
+from pbrs_farm.formats.film_mp4 import film
 
 _SCHEMA: Final = pa.schema(
     [
@@ -73,14 +71,8 @@ def _write_medium(clip: Clip, out: Path) -> str:
         (out / name).write_bytes(clip.views[0].data(mode))
         return name
     name = f"{DATASET}/{clip.name}.mp4"
-    ends = [
-        (int(v.facts["frame"]), float(v.facts["time_s"])) for v in (clip.views[0], clip.views[-1])
-    ]
-    frames = (
-        np.asarray(layer_from_bytes(mode, view.data(mode), view.id)[..., :3], np.uint8)
-        for view in clip.views
-    )
-    (out / name).write_bytes(film(frames, film_pace(*ends)))
+    frames = (picture_of(view, "questions") for view in clip.views)
+    (out / name).write_bytes(film(frames, pace_of(clip.views)))
     return name
 
 

@@ -13,7 +13,7 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.export.chosen_view import Choice, ChosenView, require_lens
-from pbrs_farm.export.form import Convention, ViewForm
+from pbrs_farm.export.form import Convention, ViewForm, write_file
 
 # Layer -> its path in the published data.
 FILES: Final = {
@@ -41,7 +41,7 @@ def write_released(views: list[ChosenView], out: Path, _choice: Choice) -> None:
             place = {"house": house, "id": f"{number:06d}"}
             for layer, published in FILES.items():
                 if view.has(layer):
-                    _write_file(out / published.format(**place), view.data(layer))
+                    write_file(out / published.format(**place), view.data(layer))
             good.append("{house}/{id}\n".format(**place))
         _write_cameras(out / "camera_v2" / house, house_views)
     (out / "data_goodlist_v2.txt").write_text("".join(good), "utf-8")
@@ -53,11 +53,6 @@ def _write_cameras(folder: Path, views: list[ChosenView]) -> None:
     (folder / "room_camera.txt").write_text("".join(camera_line(v) for v in views), "utf-8")
     names = "".join(f"Room#{v.entry.room_id}_{v.facts.get('sector', 0)}\n" for v in views)
     (folder / "room_camera_name.txt").write_text(names, "utf-8")
-
-
-def _write_file(target: Path, data: bytes) -> None:
-    target.parent.mkdir(parents=True, exist_ok=True)
-    target.write_bytes(data)
 
 
 def camera_line(view: ChosenView) -> str:
