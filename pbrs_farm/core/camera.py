@@ -375,10 +375,7 @@ def _lens_faces(i: Intrinsics) -> PinholeFaces:
 
 
 def pinholes_of(camera: Camera) -> tuple[list[Camera], PinholeFaces]:
-    """Pin-hole cameras at the same eye that together see what the camera does, in finer pixels.
-
-    And how its picture follows from theirs. For what only draws pin-holes.
-    """
+    """Pin-hole cameras at the same eye that together see what the camera does, and the way back."""
     faces = _lens_faces(camera.intrinsics)
     cameras = []
     for face in faces.faces:

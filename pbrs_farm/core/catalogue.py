@@ -110,10 +110,7 @@ class Catalogue:
         return tuple(p for p in self.pieces if p.group in groups)
 
     def shape(self, piece: Piece) -> Shape | None:
-        """The piece's shape, loaded once; None if its model is unusable.
-
-        The result is shared: do not write into its arrays.
-        """
+        """The piece's shape, loaded once and shared (do not write into it); None if its model is unusable."""
         if piece.id not in self._shapes:
             self._shapes[piece.id] = self.load(piece)
         return self._shapes[piece.id]

@@ -29,12 +29,7 @@ _MOST_NAMES: Final = 12  # names of fields that a hint lists
 
 
 def json_from_bytes(data: bytes, file: object, *, error: type[BadInput] = BadHouse) -> Any:
-    """The JSON value in data; an error for text that is not JSON, NaN, or absurdly deep nesting.
-
-    Every failure is one `error` that names the file and, if known, the line and column or the byte: empty
-    text, text that is not UTF-8, NaN and Infinity, numbers of absurdly many digits, and nesting beyond
-    Python's stack. `checked` checks the value.
-    """
+    """The JSON value in data; an `error` naming file, line and column for damage, NaN or deep nesting."""
     if not data.strip():
         raise error(file, "", "not valid JSON: the text is empty")
     try:
@@ -80,10 +75,7 @@ def checked(
     error: type[BadInput] = BadInput,
     hint: str = "",
 ) -> T:
-    """Validate a JSON value, or bytes of JSON, as a kind; an error names file and place.
-
-    place: of the value in the file. hint: for errors without a better one.
-    """
+    """Validate a JSON value, or bytes of JSON, as a kind; an error names file and place. hint: its default."""
     adapter: TypeAdapter[T] = kind if isinstance(kind, TypeAdapter) else _adapter_of(kind)
     try:
         if isinstance(data, bytes):
@@ -154,11 +146,7 @@ _WANTED: Final = {
 
 
 def sentence(fault: ErrorDetails) -> str:
-    """A pydantic error as one plain sentence.
-
-    Errors of our validators keep their sentence; common kinds of pydantic's have sentences here, others give
-    the expected and the actual value.
-    """
+    """A pydantic error as one plain sentence: a validator's own, one of here, or expected and actual value."""
     kind, facts = fault["type"], fault.get("ctx", {})
     if kind in ("value_error", "assertion_error"):
         return str(facts["error"])  # our own validators write sentences
@@ -184,11 +172,7 @@ def _shown_value(value: object) -> str:
 
 
 def exactly(n: int, what: str = "numbers") -> BeforeValidator:
-    """In Annotated: a list or tuple of n values, called `what` in the error.
-
-    Put it before the item's own type, so that a list of the wrong length gives one sentence, "expected 3
-    numbers", and not an error for each missing or extra value. The type checks the values.
-    """
+    """In Annotated, before the item's type: a list or tuple of n values, called `what` in its one error."""
 
     def check(value: object) -> object:
         if not isinstance(value, list | tuple) or len(value) != n:

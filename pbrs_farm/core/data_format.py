@@ -33,10 +33,7 @@ class DataFormat:
     beside: tuple[str, ...] = ()  # patterns of names of files that lie beside one and are no homes
 
     def is_sure_of(self, suffix: str, head: bytes) -> bool:
-        """True if the suffix (lower case) and the first bytes of a file prove this format.
-
-        A suffix that several formats share (`shared_suffixes`) needs `contains` in head.
-        """
+        """True if the suffix (lower case) and, if `shared_suffixes` has it, the head prove this format."""
         if suffix not in self.suffixes:
             return False
         return suffix not in self.shared_suffixes or (

@@ -56,9 +56,7 @@ class FloatModel(Record):
 
 
 class RemoveItems(Record):
-    """Take items away; the holes that doors and windows among them cut stay, and so do the instance
-    ids of all other items.
-    """
+    """Take items away; holes of doors and windows among them, and the others' instance ids, stay."""
 
     do: Literal["remove"] = "remove"
     items: tuple[str, ...]

@@ -1,7 +1,4 @@
-"""Tables of entries: one for each module of a package, and those of installed plugins.
-
-Effects: a module is imported when its entry is first asked for, a plugin's code likewise.
-"""
+"""Tables of entries, one a module of a package and those of plugins, imported when first asked for."""
 
 from __future__ import annotations
 
@@ -40,10 +37,7 @@ class EntryTable:
         return (*own_names, *(name for name in plugins(self.group) if name not in own_names))
 
     def entry(self, name: str) -> Any:
-        """The entry of that name; KeyError for an unknown name.
-
-        Raises MachineFailed if a plugin's entry point is no such entry, or has another name.
-        """
+        """The entry of that name, KeyError without; MachineFailed if that of a plugin is wrong or misnamed."""
         if name in self.own_names():
             module = import_module(f"{self.package}.{name.replace('-', '_')}")
             return getattr(module, self.attribute)

@@ -1,8 +1,4 @@
-"""The kind of a file by its first bytes, for messages of readers that cannot read it.
-
-No effects. For a picture named .glb, an HTML page saved as .hdr or a pointer of Git LFS, the reader's own
-words ("no GLB file", "not UTF-8") would mislead people.
-"""
+"""The kind of a file by its first bytes, for clear messages about a misnamed one; no effects."""
 
 from __future__ import annotations
 
@@ -84,10 +80,7 @@ def other_kind(data: bytes, name: object) -> FileKind | None:
 
 
 def wrong_kind(data: bytes, name: object) -> tuple[str, str]:
-    """(what to say, hint) of a file that could not be read and is of another kind than its name says.
-
-    ("", "") where its content says nothing. "is a PNG picture, though named .glb".
-    """
+    """("is a PNG picture, though named .glb", hint) of an unreadable file; ("", "") if its bytes say nothing."""
     if not data:
         return "is empty", "copy it again"
     kind = other_kind(data, name)

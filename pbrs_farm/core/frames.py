@@ -34,11 +34,7 @@ def rotation_x(angle_rad: float) -> F64:
 
 
 def rotation_y(angle_rad: float) -> F64:
-    """(3, 3) right-handed rotation about +y.
-
-    For column vectors, p' = R p: a positive angle takes +z towards +x, which is anticlockwise seen
-    from above.
-    """
+    """(3, 3) right-handed rotation of column vectors about +y: a positive angle takes +z towards +x."""
     c, s = np.cos(angle_rad), np.sin(angle_rad)
     return np.array([[c, 0, s], [0, 1, 0], [-s, 0, c]], np.float64)
 
@@ -55,10 +51,7 @@ LYING_ALONG_Z: F64 = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0
 
 
 def is_flattening(matrix: F64) -> bool:
-    """True if a linear map (D, D) leaves less than D dimensions, whatever its scale.
-
-    A scale of 1e-5 (quantized vertices) has a determinant of 1e-15 and is no flattening.
-    """
+    """True if a linear map (D, D) leaves less than D dimensions, whatever its scale (1e-5 is no flattening)."""
     if not np.isfinite(matrix).all():
         return False  # the caller refuses a result with such numbers
     sizes = np.linalg.svd(np.asarray(matrix, np.float64), compute_uv=False)
@@ -72,21 +65,13 @@ def transform_points(a_from_b: F64, points_b: NDArray[np.floating]) -> F64:
 
 
 def linear_from_srgb(encoded: NDArray[np.floating]) -> F64:
-    """Linear values from sRGB-encoded ones, both in 0..1 (IEC 61966-2-1).
-
-    Any shape; float64 comes back. Divide 8-bit values by 255 first. Values above 1 follow the same
-    curve; negative ones stay on its linear part.
-    """
+    """Linear values, float64, from sRGB-encoded ones, both in 0..1 (IEC 61966-2-1); not clipped."""
     e = np.asarray(encoded, np.float64)
     return np.where(e <= 0.04045, e / 12.92, ((np.maximum(e, 0) + 0.055) / 1.055) ** 2.4)
 
 
 def srgb_from_linear(linear: NDArray[np.floating]) -> F64:
-    """sRGB-encoded values from linear ones, both in 0..1 (IEC 61966-2-1).
-
-    Any shape; float64 comes back, not rounded. It clips nothing: light above 1 gives values above
-    1, and negative values stay on the linear part.
-    """
+    """sRGB-encoded values, float64, from linear ones, both in 0..1 (IEC 61966-2-1); not clipped."""
     v = np.asarray(linear, np.float64)
     return np.where(v <= 0.0031308, 12.92 * v, 1.055 * np.maximum(v, 0) ** (1 / 2.4) - 0.055)
 

@@ -142,11 +142,7 @@ def corners_of_surfaces(surfaces: Iterable[Surface]) -> F64:
 
 
 def part_of(surface: Surface, faces: I32, name: str) -> Surface:
-    """Some faces of a surface with their vertices, as a new surface.
-
-    faces: (F, 3) int32 indices into the surface's vertices, repetitions allowed. Vertices are renumbered
-    and unused ones dropped; material, texture coordinates and normals are kept.
-    """
+    """Some faces (F, 3) of a surface, maybe repeated, with their vertices, renumbered, as a new surface."""
     used, numbers = np.unique(faces, return_inverse=True)
     return Surface(
         name=name,
@@ -271,10 +267,7 @@ class Item:
 
     @property
     def is_outside(self) -> bool:
-        """True for an item before the windows.
-
-        Such items are only seen through windows: the camera search and exports of a home omit them.
-        """
+        """True for an item before the windows, which the camera search and exports of a home omit."""
         return OUTSIDE in self.tags
 
     @property
@@ -420,10 +413,7 @@ class House:
         return replace(self, items=tuple(items))
 
     def surfaces(self) -> Iterator[tuple[int, Item, int, Surface]]:
-        """(instance id from 1, item, index in the item, surface) of every surface, in order.
-
-        The position in this sequence is the number in Geometry.face_surface, with and without panes.
-        """
+        """(instance id from 1, item, index in it, surface) in order, as Geometry.face_surface numbers them."""
         for index, item in enumerate(self.items):
             for j, surface in enumerate(item.surfaces):
                 yield index + 1, item, j, surface
@@ -452,11 +442,7 @@ class Geometry:
 
 
 def geometry_from_house(house: House, *, with_panes: bool = True) -> Geometry:
-    """Concatenate every surface of house; with_panes False leaves out window panes (light only).
-
-    Surface numbers are the same with and without panes. Nothing is welded. Missing normals and texture
-    coordinates are zeros.
-    """
+    """Concatenate every surface, unwelded; with_panes False leaves window panes, but no number, out."""
     positions, normals, uvs, faces = [], [], [], []
     face_item, face_material, face_surface = [], [], []
     n_vertices = 0

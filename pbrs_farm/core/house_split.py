@@ -35,11 +35,7 @@ class SplitShares:
 
 
 def shares_from_text(text: str) -> SplitShares:
-    """80/10/10 as Shares; raises BadInput.
-
-    Shares need not add up to 100: 8/1/1 says the same, since they are divided by their sum. One of
-    them may be 0. A sum that is not above 0, or not three numbers, is the BadInput.
-    """
+    """80/10/10 (or 8/1/1) as shares of a sum above 0; raises BadInput."""
     try:
         train, val, test = (float(part) for part in text.split("/"))
     except ValueError:
@@ -51,20 +47,13 @@ def shares_from_text(text: str) -> SplitShares:
 
 
 def home_of(house: str) -> str:
-    """The house's id without its digest and its variant: `studio` of studio-1a2b3c4d-d3.
-
-    Variants of one home go into one split: a network must not train on the walls of its test set. An id of
-    another form is returned unchanged.
-    """
+    """The house's id without digest and variant: `studio` of studio-1a2b3c4d-d3; other ids unchanged."""
     match = re.fullmatch(r"(?P<home>.+?)" + _DIGEST_AND_VARIANT.pattern, house)
     return match["home"] if match else house
 
 
 def split_of_house(house: str, shares: SplitShares | None = None) -> str:
-    """ "train", "val" or "test" of a house's id, by the sha256 of the home's name.
-
-    Adding houses moves no other, and variants of one home stay together. The shares hold on average.
-    """
+    """ "train", "val" or "test" by the sha256 of the home's name; the shares hold on average."""
     shares = shares or SplitShares()
     # Take a number of 0..1 from the home's name.
     digest = hashlib.sha256(home_of(house).encode()).digest()

@@ -67,11 +67,7 @@ class Joint:
         return matrix
 
     def placed(self, matrix: F64) -> Joint:
-        """The joint of an item whose surfaces are moved by a matrix (4, 4): turned, scaled, mirrored.
-
-        A scale must run along the axis and across it, as that of furniture's own axes does. Masses
-        grow with the volume.
-        """
+        """The joint of an item moved by a matrix (4, 4), scaled along and across the axis; masses follow."""
         linear = matrix[:3, :3]
         axis = linear @ np.array(self.axis)
         length = float(np.linalg.norm(axis))

@@ -94,26 +94,17 @@ def marker_name(step: str, view: str | None = None) -> str:
 
 
 def marker_key(house: str, step: str, view: str | None = None) -> str:
-    """Key of the marker of a done step, with a view for steps of a view.
-
-    The marker, not the files of a step, tells that it is done.
-    """
+    """Key of the marker, which alone says that a step (of a view, if given) is done."""
     return house_key(house, f"done/{marker_name(step, view)}.json")
 
 
 def unfinished_key(house: str, step: str = "", view: str = "") -> str:
-    """Key of an unfinished step's checkpoint; of the folder of all, with a trailing slash, when step is "".
-
-    A checkpoint may be deleted: the step then begins again.
-    """
+    """Key of an unfinished step's checkpoint, which may be deleted; of their folder when step is ""."""
     return house_key(house, f"unfinished/{step}.{view}.npz" if step else "unfinished/")
 
 
 def parse_house_key(key: str) -> HouseKey | None:
-    """The parts of a key that house_key, view_key or marker_key built; None for any other key.
-
-    For a marker `file` is "" and `step` is set.
-    """
+    """The parts of a house's, view's or marker's (`file` "", `step` set) key; None for any other."""
     match = _HOUSE_KEY.fullmatch(key)
     if match is None or match["root"] != FOLDERS[is_object(match["house"])]:
         return None
@@ -134,11 +125,7 @@ def histogram_pack_key(house: str) -> str:
 
 
 def canonical_json(value: Any) -> str:
-    """JSON with sorted keys and no spaces: equal values give equal text.
-
-    A pydantic model is dumped first. Characters beyond ASCII are escaped; floats are written as
-    Python's repr, so 1 and 1.0 differ. Raises TypeError for values without a JSON form, such as arrays.
-    """
+    """JSON of a model or value with sorted keys, no spaces, ASCII: equal values give equal text. TypeError."""
     if hasattr(value, "model_dump"):
         value = value.model_dump(mode="json")
     return json.dumps(value, sort_keys=True, separators=(",", ":"), ensure_ascii=True)
@@ -155,9 +142,5 @@ def digest(*parts: Any) -> str:
 
 
 def seed(*parts: str | int) -> int:
-    """A 32-bit seed from names: seed(house, view, mode, recipe digest), rule 7.
-
-    The same names give the same numbers on every machine and in every order of work. Give each purpose a
-    word of its own among the parts, or two choices are correlated.
-    """
+    """A 32-bit seed from names (rule 7), equal on every machine; each purpose needs another word."""
     return int(digest(*parts)[:8], 16)

@@ -33,11 +33,7 @@ Resized: TypeAlias = Literal["nearest", "area", "lines", "pixels"]
 
 @dataclass(frozen=True, slots=True)
 class Layer:
-    """One file of a view.
-
-    layers.csv beside this module has a row for each, and is the only list of layers: files, `--layers`,
-    requirements of lenses, digests, pages, films, exports and `verify` read it.
-    """
+    """One file of a view: a row of layers.csv, the only list of layers, which all code reads."""
 
     name: str
     file: str  # below the view's folder
@@ -63,10 +59,7 @@ class Layer:
 
     @property
     def is_label(self) -> bool:
-        """Whether neighbouring values must not be mixed when the picture is scaled.
-
-        True for classes, ids and masks: scale those by the nearest pixel, never by averaging.
-        """
+        """True for classes, ids and masks, which are scaled by the nearest pixel, never averaged."""
         return self.shown_as in ("classes", "ids", "mask")
 
     @property
@@ -196,10 +189,7 @@ OPTIONAL: Final = tuple(
 
 
 def layers_in_digest(names: Iterable[str], max_albedo: float) -> list[str]:
-    """Inputs of these layers for the digest of the step `truth`, beside their names and plugins.
-
-    max_albedo: the recipe's limit of albedo. A layer of version 1 adds nothing.
-    """
+    """Inputs of these layers (of versions above 1, of max_albedo) for the digest of the step `truth`."""
     named_layers = [layer for layer in LAYERS if layer.name in set(names)]
     shown = [f"{layer.name} {max_albedo}" for layer in named_layers if layer.shows_albedo]
     return [

@@ -57,10 +57,7 @@ class Lens:
 
     @property
     def depth_is_planar(self) -> bool:
-        """Depth is z along the optical axis; else the distance along the ray.
-
-        A model that sees more than half of all directions has no z that could be stored.
-        """
+        """True if depth is z; a model that sees more than half of all directions has the ray's distance."""
         return self.model in ("pinhole", "radtan")
 
     @property

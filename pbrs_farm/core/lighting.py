@@ -66,10 +66,7 @@ def flux_lm(
     lamp_lm: float = 1_600.0,
     lm_per_watt: float = 13.0,
 ) -> float:
-    """Luminous flux in lm of one light source (docs/light.md: one photometric scale).
-
-    share: of the lamp's power. lamp_lm: flux of a Sweet Home 3D lamp of power 0.5; lm_per_watt: SUNCG's.
-    """
+    """Flux of a share of a power (docs/light.md); lamp_lm: of Sweet Home 3D's power 0.5; lm_per_watt: SUNCG's."""
     if unit is PowerUnit.SWEETHOME3D:
         return float(lamp_lm * (power / 0.5) ** 2 * share)
     if unit is PowerUnit.WATT:

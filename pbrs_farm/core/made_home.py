@@ -53,12 +53,7 @@ class MadeHome:
 
     @property
     def word(self) -> str:
-        """The word that names this home alone.
-
-        What differs from the defaults is spelled out, the rest is left out: two equal homes have
-        one word, and `made_homes` reads it back. It is part of the digest, so its form must not
-        change.
-        """
+        """The word, without defaults, that names this home; its form is part of the digest and may not change."""
         parts = [f"{PREFIX}{self.seed}"]
         plain = MadeHome(self.seed)
         for name, key in (("bedrooms", "rooms"), ("area", "area")):

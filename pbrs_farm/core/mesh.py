@@ -44,11 +44,7 @@ def dots(a: F64, b: F64) -> F64:
 
 
 def points_bounds(points: NDArray[np.floating]) -> tuple[F64, F64]:
-    """(3,) least and greatest coordinates of points (N, 3), in a tenth of numpy's time; N > 0.
-
-    float64 from points of any float type. ValueError for no points: ask first, or take Item.bounds,
-    which gives NaN.
-    """
+    """(3,) least and greatest float64 coordinates of points (N, 3), faster than numpy; ValueError for none."""
     columns = np.ascontiguousarray(points.T)
     return columns.min(1).astype(np.float64), columns.max(1).astype(np.float64)
 
@@ -129,11 +125,7 @@ def signed_volume(corners: F64, origin: F64) -> float:
 
 
 def closed_edge_share(places: NDArray[np.floating]) -> float:
-    """Share of edges that an even number of triangles meets: 1 for a closed mesh, 0 for no mesh.
-
-    places: (F, 3, 3) corners, rounded by the caller so that corners of one place are equal. Winding does
-    not matter; edges of zero length do not count.
-    """
+    """Share of edges that an even number of triangles (F, 3, 3), rounded before, meets; 0 without."""
     # Number the places, so that seams of texture and normals do not open the mesh.
     _, vertex = numbered_points(places.reshape(-1, 3))
     edges = np.sort(vertex.reshape(-1, 3)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
@@ -155,11 +147,7 @@ def outside_area(corners: F64) -> float:
 
 
 def edges_are_paired(faces: NDArray[np.integer]) -> bool:
-    """True if each directed edge of faces (F, 3) has its reverse, equally often; True for no face.
-
-    faces: numbers of places, equal for corners of one place. Edges of zero length do not count. Such a mesh
-    is closed, and its winding is consistent.
-    """
+    """True if each directed edge of faces (F, 3) of places has its reverse: closed and wound alike."""
     start, end = (faces[:, k].astype(np.int64) for k in ([0, 1, 2], [1, 2, 0]))
     n = int(faces.max(initial=0)) + 1
     # Number each edge in both directions: what leaves a place must come back to it.
@@ -168,10 +156,7 @@ def edges_are_paired(faces: NDArray[np.integer]) -> bool:
 
 
 def clipped_to_box(corners: F64, low: F64, high: F64) -> F64:
-    """(G, 3, 3) the part of triangles (F, 3, 3) in the box low..high (3,), with their fronts.
-
-    A triangle in a side of the box remains if its front faces outwards.
-    """
+    """(G, 3, 3) the part of triangles (F, 3, 3) in the box low..high (3,), on its sides if facing out."""
     # Leave out most of them by their bounds, then cut by one side of the box after the other.
     least, most = triangle_bounds(corners)
     corners = corners[(most >= low).all(1) & (least <= high).all(1)]
@@ -219,10 +204,7 @@ def _cut(corners: F64, axis: int, sign: float, place: float) -> F64:
 
 
 def distances_to_triangles(points: F64, corners: F64) -> F64:
-    """(F,) distance in metres from each point to the triangle (F, 3, 3) of the same row.
-
-    points: (F, 3), or (3,) for all triangles. A triangle without area is the segment it covers.
-    """
+    """(F,) metres from points (F, 3), or one, to the triangle (F, 3, 3) of that row, maybe flat."""
     # Put the components first and the point at the origin: corner k is from_point[k], (3, F).
     from_point = np.ascontiguousarray(np.moveaxis(corners - points[..., None, :], 0, -1))
     a = from_point[0]

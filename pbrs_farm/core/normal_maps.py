@@ -48,11 +48,7 @@ def tangents(corners: F64, uvs: F64) -> tuple[F64, F64, Bools]:
 
 
 def perturbed_normals(normals: F64, dp_du: F64, side: F64, mapped: F64) -> F64:
-    """(N, 3) unit normals of a map, in the frame of the shading normals; all arguments (N, ...).
-
-    normals: unit, of the front; mapped: of the map, as normals_from_picture gives them. A normal
-    whose tangent vanishes stays.
-    """
+    """(N, 3) unit normals of a map in the shading normals' frame; unchanged where a tangent vanishes."""
     # Make dp/du orthogonal to the shading normal (Gram-Schmidt).
     tangent = dp_du - normals * (normals * dp_du).sum(1, keepdims=True)
     length = np.linalg.norm(tangent, axis=1, keepdims=True)

@@ -8,10 +8,7 @@ _MAX_DIGITS: Final = 40  # of a number; more is no number that anybody means
 
 
 def ends_of(word: str) -> tuple[str, str]:
-    """Both ends of a range as text: `1..20` -> ("1", "20"), `7` -> ("7", "7").
-
-    The caller checks that the ends are ascending numbers; `range_of` does so.
-    """
+    """Both ends of a range as text, unchecked: `1..20` -> ("1", "20"), `7` -> ("7", "7")."""
     first, dots, last = word.partition("..")
     return (first, last) if dots else (first, first)
 

@@ -107,10 +107,7 @@ class LensFields(FieldGroup):
         return Lens(self.model, coefficients, limit)
 
     def intrinsics(self, pinhole: Intrinsics) -> Intrinsics:
-        """The intrinsics of a view sampled with a pin-hole's; unchanged without a lens.
-
-        Raises ValueError if the distortion folds the picture, or a fisheye lacks fx and hfov_deg.
-        """
+        """Intrinsics of a view sampled with a pin-hole's; ValueError for a fold or a fisheye without fx."""
         intrinsics = self._unchecked(pinhole)
         fold = None if intrinsics is pinhole else fold_of(intrinsics)
         if fold is not None:

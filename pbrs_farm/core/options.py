@@ -43,19 +43,13 @@ class Option:
 def option(
     default: Any, text: str, *, ge: float | None = None, le: float | None = None, **shown: Any
 ) -> Any:
-    """A field that is an option: its default, its help, limits of any value, and fields of Option.
-
-    In text, {default} stands for the verb's default.
-    """
+    """A field that is an option: default, help ({default}: the verb's), limits, and fields of Option."""
     shown_as: dict[str, Any] = {"option": Option(**shown)}
     return Field(default, ge=ge, le=le, description=text, json_schema_extra=shown_as)
 
 
 def options_of(model: type[Record]) -> dict[str, tuple[str, Option]]:
-    """Option's name as in job files and namespaces -> (field, how it is written), in their order.
-
-    Fields without an option are left out.
-    """
+    """Option's name as in job files and namespaces -> (field, how it is written), in their order."""
     options: dict[str, tuple[str, Option]] = {}
     for field, info in model.model_fields.items():
         shown: Any = (cast(Any, info.json_schema_extra) or {}).get("option")
@@ -108,10 +102,7 @@ def check_limit(file: str, place: str, value: Any, shown: Option) -> None:
 
 
 def values_of_table(table: Mapping[str, Any], model: type[Record], file: str) -> dict[str, Any]:
-    """The entries of a file's table as parsed arguments: by option's name, checked by its field.
-
-    Raises BadInput with file and entry for one that is no option, or that does not fit.
-    """
+    """A file's table as parsed arguments by option's name; BadInput with file and entry."""
     options = options_of(model)
     values: dict[str, Any] = {}
     for written, value in table.items():
@@ -128,10 +119,7 @@ def values_of_table(table: Mapping[str, Any], model: type[Record], file: str) ->
 
 
 def record_of(values: Mapping[str, Any], model: type[_Options]) -> _Options:
-    """The record with values by option's name and defaults for the others.
-
-    For calls from Python. Raises BadInput, naming the option, for a value that does not fit.
-    """
+    """The record with values by option's name, defaults for the others; BadInput names the option."""
     fields: dict[str, Any] = {}
     for name, value in values.items():
         field, shown = options_of(model)[name]

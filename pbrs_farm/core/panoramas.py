@@ -31,10 +31,7 @@ FACE_AXES: Final[F64] = np.array(
 
 
 def directions_of_equirect(plane: F64) -> F64:
-    """(N, 3) unit directions, OpenCV's axes, of (longitude, latitude) (N, 2), radians; NaN beyond the poles.
-
-    (0, 0) is forward; longitude grows to the right, latitude downwards.
-    """
+    """(N, 3) unit directions, OpenCV's axes, of (longitude, latitude down), radians; NaN beyond poles."""
     longitude, latitude = plane[:, 0], plane[:, 1]
     level = np.cos(latitude)
     directions = np.stack(
@@ -44,11 +41,7 @@ def directions_of_equirect(plane: F64) -> F64:
 
 
 def equirect_of_directions(directions: F64) -> F64:
-    """(N, 2) longitude in -pi..pi and latitude downwards of directions (N, 3) of any length.
-
-    Radians, OpenCV's axes; latitude is positive below the horizon. Straight up and down any
-    longitude is right, and 0 is given.
-    """
+    """(N, 2) longitude -pi..pi (0 at the poles) and latitude downwards, radians, of (N, 3)."""
     x, y, z = directions.T
     return np.stack([np.arctan2(x, z), np.arctan2(y, np.hypot(x, z))], axis=1)
 
@@ -70,10 +63,7 @@ def directions_of_cubemap(plane: F64) -> F64:
 
 
 def cubemap_of_directions(directions: F64) -> F64:
-    """(N, 2) the strip's points of directions (N, 3) of any length, OpenCV's axes; NaN for length 0.
-
-    On an edge between two faces the first one in FACE_AXES is taken.
-    """
+    """(N, 2) the strip's points of directions (N, 3), the first face on an edge; NaN for length 0."""
     number = np.argmax(directions @ FACE_AXES[:, 2].T, axis=1)
     local = np.einsum("nij,nj->ni", FACE_AXES[number], directions)
     with np.errstate(divide="ignore", invalid="ignore"):

@@ -1,7 +1,4 @@
-"""Pin-hole pictures that together hold what a lens sees, and the lens's picture from theirs; no effects.
-
-For renderers that draw pin-holes alone: one wider picture where it fits, else the faces of a cube.
-"""
+"""Pin-hole pictures (one, else six of a cube) that hold what a lens sees, and the way back; no effects."""
 
 from __future__ import annotations
 
@@ -43,11 +40,7 @@ class PinholeFaces:
     y: F64
 
     def nearest(self, pictures: Sequence[NDArray[Any]]) -> NDArray[Any]:
-        """(H, W, ...) the lens's picture by the nearest pixel; 0 where there is no ray.
-
-        For labels, whose values must not be mixed. pictures has one (h, w, ...) array a face, in
-        their order and all of one type, which is that of the result.
-        """
+        """(H, W, ...) labels of the lens by the nearest pixel of pictures (h, w, ...), 0 without a ray."""
         out = np.zeros((*self.number.shape, *pictures[0].shape[2:]), pictures[0].dtype)
         for k, picture in enumerate(pictures):
             on_face = self.number == k
@@ -57,11 +50,7 @@ class PinholeFaces:
         return out
 
     def bilinear(self, pictures: Sequence[NDArray[np.floating]]) -> NDArray[np.float32]:
-        """(H, W, C) the lens's picture of (h, w, C) pictures; 0 where there is no ray.
-
-        For light and depth of surfaces, not for ids. pictures has one float array a face, at least
-        2 x 2 pixels; a border repeats itself, nothing is taken from the neighbouring face.
-        """
+        """(H, W, C) light or depth of the lens from pictures (h, w, C) per face; 0 without a ray."""
         out = np.zeros((*self.number.shape, pictures[0].shape[2]), np.float32)
         for k, picture in enumerate(pictures):
             on_face = self.number == k

@@ -56,10 +56,7 @@ class Plugin:
 
 @cache
 def plugins(group: str) -> Mapping[str, Plugin]:
-    """The installed plugins of a group by name; of two with one name the first package's.
-
-    Runs no plugin's code. Cached for the life of the process, which misses packages installed meanwhile.
-    """
+    """The installed plugins of a group by name, the first of equal ones; cached, runs no plugin's code."""
     by_name: dict[str, Plugin] = {}
     for entry in sorted(entry_points(group=f"pbrs_farm.{group}"), key=_order):
         package = entry.dist.name if entry.dist else "?"
@@ -103,10 +100,7 @@ def marks_in_digest(group: str, names: Iterable[str]) -> list[str]:
 
 
 def checked_names(group: str, names: str) -> str:
-    """Check names of plugins joined by ':', for validators of fields; ValueError for an unknown one.
-
-    Empty parts are allowed, and the text is returned unchanged.
-    """
+    """The text, if it is plugins' names or "" joined by ':'; ValueError, for validators of fields."""
     installed = plugins(group)
     for name in filter(None, names.split(":")):
         if name not in installed:

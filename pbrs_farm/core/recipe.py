@@ -186,10 +186,7 @@ RECIPE_NAMES = tuple(_PRESETS)
 
 
 def recipe_from_name(name: str, overrides: Mapping[str, str] | None = None) -> Recipe:
-    """The named preset with overrides ("group.field" -> text, parsed as JSON, else as a string).
-
-    Raises BadRecipe for an unknown name or field, or a value that does not fit.
-    """
+    """The named preset with overrides ("group.field" -> JSON text, else a string); raises BadRecipe."""
     if name not in _PRESETS:
         raise BadRecipe(f"no recipe {name!r}", hint=hint_of_choice(name, RECIPE_NAMES))
     return changed_recipe(name, name, {}, overrides or {})
@@ -198,10 +195,7 @@ def recipe_from_name(name: str, overrides: Mapping[str, str] | None = None) -> R
 def changed_recipe(
     name: str, base: str, changes: Mapping[str, Any], overrides: Mapping[str, str]
 ) -> Recipe:
-    """A recipe called name: the preset base, then changes (group -> field -> value), then overrides.
-
-    Raises BadRecipe for a field there is not, naming the nearest, or a value that does not fit.
-    """
+    """A recipe: preset base, then changes (group -> field -> value), then overrides; raises BadRecipe."""
     # Start from the preset, then override field by field; pydantic judges the whole.
     fields: dict[str, Any] = {"name": name}
     for group, values in _PRESETS[base].items():
@@ -292,10 +286,7 @@ def groups() -> Iterator[tuple[str, type[FieldGroup]]]:
 
 
 def recipe_from_json(data: bytes, place: str) -> Recipe:
-    """Read a stored recipe.json; BadRecipe, naming its place, if this version cannot read it.
-
-    Use formats.recipe_toml for a .toml that a person wrote: its errors name the entry.
-    """
+    """Read a stored recipe.json; BadRecipe naming its place. A person's .toml: formats.recipe_toml."""
     try:
         return Recipe.model_validate_json(data)
     except ValidationError:
@@ -315,11 +306,7 @@ def _set(fields: dict[str, Any], path: str, text: str) -> None:
 
 
 def differences(a: Recipe, b: Recipe) -> list[str]:
-    """ "group.field: a -> b" for every field that differs, names aside.
-
-    For messages: empty where both are equal but for the name. A field that one recipe does not have
-    shows as None.
-    """
+    """ "group.field: a -> b" for every field that differs, names aside; None for a missing field."""
     lines: list[str] = []
 
     def walk(x: Any, y: Any, path: str) -> None:

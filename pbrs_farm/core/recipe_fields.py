@@ -425,10 +425,7 @@ class RasterFields(FieldGroup):
 
 
 class HistogramFields(FieldGroup):
-    """The histograms and quality figures of a view (paper section 3.3).
-
-    Bins are powers of two, so that every coarser binning is an exact sum of these.
-    """
+    """Histograms and quality of a view (paper section 3.3), in powers of two that sum to coarser bins."""
 
     steps = ("view",)
 

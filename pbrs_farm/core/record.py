@@ -43,20 +43,12 @@ Several = Annotated[tuple[_Of, ...], BeforeValidator(_several)]
 
 
 def read_toml(path: Path, kind: type[_T]) -> _T:
-    """Read a TOML table of the package; BadInput names the file and the entry.
-
-    kind: a type that pydantic validates: a dataclass, a model, a mapping. Recipes and other files of people
-    have their own readers.
-    """
+    """Read a TOML table of the package as a kind that pydantic validates; BadInput names file and entry."""
     return _read(path, kind, tomllib.loads)
 
 
 def read_csv(path: Path, row: type[_T]) -> tuple[_T, ...]:
-    """The rows of a CSV table beside the code, lines with # left out; BadInput as of read_toml.
-
-    row is the type of one row; an empty cell takes the default of its field. The first line that is
-    not a comment names the columns.
-    """
+    """Rows of a CSV of the package, # lines left out, empty cells as defaults; BadInput as of read_toml."""
 
     def rows(text: str) -> list[dict[str, str]]:
         lines = (line for line in text.splitlines() if not line.startswith("#"))

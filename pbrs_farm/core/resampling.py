@@ -11,11 +11,7 @@ Pixels = TypeVar("Pixels", bound=NDArray[Any])
 
 
 def resized_by_area(picture: Pixels, width: int, height: int) -> Pixels:
-    """(height, width, ...): mean over each pixel's area of picture (H, W, ...), uint8 or floats.
-
-    Bytes are averaged as encoded (sRGB), as usual loaders do, and rounded. Enlarging gives areas of one
-    colour.
-    """
+    """(height, width, ...) means over pixels' areas of (H, W, ...), bytes as encoded and rounded."""
     if picture.shape[:2] == (height, width):
         return picture
     if picture.dtype.kind == "f":
@@ -30,10 +26,7 @@ def resized_by_area(picture: Pixels, width: int, height: int) -> Pixels:
 
 
 def resized_nearest(array: Pixels, width: int, height: int) -> Pixels:
-    """(height, width, ...) of array (H, W, ...): the pixel whose centre is nearest, for ids and classes.
-
-    Without a change of size the array itself is returned, not a copy.
-    """
+    """(height, width, ...) of the nearest centres, for ids and classes; the array itself if unchanged."""
     if array.shape[:2] == (height, width):
         return array
     rows = _nearest(array.shape[0], height)
@@ -42,10 +35,7 @@ def resized_nearest(array: Pixels, width: int, height: int) -> Pixels:
 
 
 def resized_any(mask: NDArray[np.bool_], width: int, height: int) -> NDArray[np.bool_]:
-    """(height, width) bool: True if any pixel of mask (H, W) in the area is set, so that lines stay whole.
-
-    Without a change of size the mask itself is returned, not a copy.
-    """
+    """(height, width) bool: any pixel of mask (H, W) in the area; the mask itself if unchanged."""
     if mask.shape == (height, width):
         return mask
     for axis, n in ((0, height), (1, width)):
@@ -63,10 +53,7 @@ def bilinear(
     uv: NDArray[np.floating],
     value_of_byte: NDArray[np.float32] | None = None,
 ) -> NDArray[np.float32]:
-    """(N, C) values of pixels (H, W, C) at uv (N, 2), v up and row 0 at the top.
-
-    value_of_byte: (256,) decoded values; None = the bytes themselves.
-    """
+    """(N, C) values of pixels (H, W, C) at uv (N, 2), v up, row 0 on top; value_of_byte: decoded, if given."""
     # Place texel centres at half integers; v points up, rows count down.
     height, width = pixels.shape[:2]
     finite = np.where(np.isfinite(uv), uv, 0).astype(np.float64)

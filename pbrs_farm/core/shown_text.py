@@ -30,11 +30,7 @@ _UNSAFE: Final = frozenset({"Cc", "Cf", "Cs", "Co", "Cn", "Zl", "Zp"})
 
 
 def shown(text: object, most: int = MAX_NAME) -> str:
-    """One printable line of at most `most` characters.
-
-    Control and format characters, line ends, bidirectional overrides, lone surrogates and unassigned code
-    points become spaces; long text loses its middle.
-    """
+    """One printable line of at most `most` characters: others become spaces, long text loses its middle."""
     plain = str(text)
     # Cut first, so that a name of megabytes costs nothing; cleaning makes no text longer.
     if len(plain) > most:
@@ -49,10 +45,7 @@ def printable(text: str) -> str:
 
 
 def escaped(json_text: str) -> str:
-    """JSON with the characters that `shown` removes escaped (\\uXXXX): nothing is lost.
-
-    Line ends between values stay.
-    """
+    """JSON with the characters that `shown` removes, but line ends, escaped (as \\uXXXX): nothing is lost."""
     if json_text.isascii():
         return json_text
     return "".join(_escape(c) if _is_unsafe(c) and c != "\n" else c for c in json_text)

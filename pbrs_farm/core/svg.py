@@ -18,10 +18,7 @@ def svg_file(**attributes: object) -> Element:
 
 
 def element(parent: Element, tag: str, content: str = "", **attributes: object) -> Element:
-    """Draw an element above the others of parent.
-
-    In names "_" means "-", css is the class; attributes without text are left out.
-    """
+    """Draw an element above parent's; in names "_" means "-", css is the class, empty attributes are left out."""
     child = _with(ET.SubElement(parent, tag), attributes)
     child.text = content or None
     return child

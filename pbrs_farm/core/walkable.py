@@ -60,11 +60,7 @@ class FloorGrid:
 
 
 def clearance_m(free: Bools) -> F64:
-    """(H, W) Euclidean distance from each cell's middle to that of the nearest cell that is not free, metres.
-
-    free: (H, W) bool; other cells have 0. Cells beyond the grid do not count, so leave a margin that is not
-    free.
-    """
+    """(H, W) metres from each cell's middle to the nearest cell of the grid that is not free."""
     return np.asarray(ndimage.distance_transform_edt(free) * CELL_M)
 
 

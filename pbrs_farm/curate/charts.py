@@ -30,10 +30,7 @@ class SvgPicture:
         element(self._svg, tag, content, **attributes)
 
     def svg(self) -> Markup:
-        """The picture as SVG text, with its labels escaped.
-
-        Marked as safe for templates, since labels are escaped when drawn.
-        """
+        """The picture as SVG text, its labels escaped when drawn, so safe for templates."""
         return Markup(svg_text(self._svg))
 
 
@@ -90,11 +87,7 @@ class PlotArea(SvgPicture):
 
 
 def distribution(scores: F64, is_kept: Bools, threshold: float, title: str) -> Markup:
-    """Chart of scores 0..1 in 50 bars, with the kept part of each, and the threshold.
-
-    scores is (n,) float64, kept (n,) bool of the same views. The axis counts views and is rounded
-    up to four whole steps; without scores the chart is drawn empty. Scores outside 0..1 are ignored.
-    """
+    """Chart of scores 0..1 in 50 bars, the kept part of each, and the threshold; maybe empty."""
     # Count all views and the kept ones with the same bin edges.
     edges = np.linspace(0, 1, 51)
     whole, _ = np.histogram(scores, edges)
@@ -112,11 +105,7 @@ def distribution(scores: F64, is_kept: Bools, threshold: float, title: str) -> M
 
 
 def joint(colour: F64, depth: F64, is_kept: Bools, limits: tuple[float, float]) -> Markup:
-    """Chart of colour score against depth score: a cell is darker the more views it holds (log scale).
-
-    A cell with both verdicts is split by their shares, since a view may be rejected for a reason
-    other than its scores.
-    """
+    """Chart of colour score against depth score: darker for more views (log scale), split by verdict."""
     n, bounds = 50, [[0, 1], [0, 1]]
     cells, _, _ = np.histogram2d(colour, depth, bins=n, range=bounds)
     good, _, _ = np.histogram2d(colour[is_kept], depth[is_kept], bins=n, range=bounds)
@@ -144,10 +133,7 @@ def joint(colour: F64, depth: F64, is_kept: Bools, limits: tuple[float, float]) 
 def yields(
     curves: Sequence[tuple[str, str, Sequence[float]]], threshold: float, paper: tuple[float, float]
 ) -> Markup:
-    """Chart of the share of views above each threshold 0..1: (name, css class, shares at equal steps).
-
-    paper: (threshold, share) of the paper's own pictures, drawn as a ring.
-    """
+    """Chart of the share of views above each threshold 0..1; paper: a ring at its own (threshold, share)."""
     frame = PlotArea(460, 400, "Yield as a function of the threshold")
     frame.axes("threshold for both scores", _TENTHS, _PERCENT)
     for _name, css, shares in curves:
@@ -169,10 +155,7 @@ def mirrored(
     label: str,
     colours: Sequence[Rgb] | None = None,
 ) -> Markup:
-    """Two histograms on one axis: the view's upwards, its reference's downwards.
-
-    colours: of each bin; the page's default colour if None.
-    """
+    """Two histograms on one axis: the view's upwards, its reference's downwards; colours: of bins."""
     width, half = 260, 44  # pixels; the axis is at half
     # Scale both histograms alike, so that they can be compared.
     drawing = SvgPicture(width, 2 * half, label)

@@ -1,7 +1,4 @@
-"""Reads photographs with depth: a folder of pairs, or NYUv2's labelled .mat. Effects: reads files.
-
-docs/selection.md shows the supported layouts of pairs, at any depth of a folder.
-"""
+"""Reads photographs with depth: pairs below a folder (docs/selection.md), or NYUv2's labelled .mat."""
 
 from __future__ import annotations
 
@@ -77,10 +74,7 @@ def _names_depth(path: Path) -> bool:
 
 
 def pairs_in(folder: Path) -> tuple[PhotoFiles, ...]:
-    """Every pair below folder, by id (its path below folder).
-
-    Raises BadInput for a folder without pairs, and for a file without its other half.
-    """
+    """Every pair below folder, by its path; BadInput without one, and for a lone half."""
     if not folder.is_dir():
         raise BadInput(folder, "", "no such folder")
     pairs: list[PhotoFiles] = []
@@ -293,11 +287,7 @@ class NyuMat:
         return int(self._depths.shape[0])
 
     def photos(self, numbers: Collection[int] | None = None) -> Iterator[Photo]:
-        """The photographs in order, ids from 0001; one at a time in memory. numbers: only those, from 1.
-
-        Numbers beyond the last are silently ignored. The picture is (H, W, 3) uint8, depth
-        (H, W) in whole mm. Raises BadInput, naming the image, if the file is damaged.
-        """
+        """The photographs (all, or those numbers from 1) in order, depth in whole mm; BadInput if damaged."""
         chosen = range(1, len(self) + 1) if numbers is None else sorted(numbers)
         for k in (number - 1 for number in chosen if number <= len(self)):
             place = f"image {k + 1}"
@@ -311,11 +301,7 @@ class NyuMat:
 
 
 def sha256_of_files(paths: list[Path]) -> str:
-    """sha256 over the digests of the files in the given order; a single file's own digest.
-
-    Raises BadInput if a file cannot be read. The order counts, the names do not; an empty list has
-    the digest of no bytes.
-    """
+    """sha256 over the files' digests in order; a single file's own digest. BadInput if unreadable."""
     digests = []
     for path in paths:
         try:

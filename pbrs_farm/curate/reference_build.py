@@ -35,10 +35,7 @@ def build_reference(
     selection: SelectionFields,
     options: PhotoOptions | None = None,
 ) -> Reference:
-    """Build the reference of a folder of RGB-D pairs, or of NYUv2's labelled .mat.
-
-    Raises BadInput naming the invalid file; docs/selection.md shows the layouts.
-    """
+    """The reference of pairs (docs/selection.md) or of NYUv2's .mat; BadInput names the file."""
     options = options or PhotoOptions()
     if options.depth_scale is not None and not options.depth_scale > 0:
         raise BadInput("--depth-scale", "", f"{options.depth_scale} is not above 0")
@@ -72,9 +69,6 @@ def _counted(
 
 
 def read_reference(path: Path) -> Reference:
-    """Read a reference file; raises BadInput naming it if it is missing or invalid.
-
-    A file of another version is invalid: counts depend on the settings, so it must be rebuilt.
-    """
+    """Read a reference file; BadInput, naming it, if it is missing, invalid or of another version."""
     hint = "`pbrs-farm reference build` makes one"
     return reference_from_bytes(read_given(path, hint=hint), str(path))

@@ -1,7 +1,4 @@
-"""`pbrs-farm select --report`: a run as one HTML page. Effects: reads the store.
-
-The page needs no network and no script: charts are inline SVG, examples are embedded thumbnails.
-"""
+"""`pbrs-farm select --report`: a run as one HTML page without network or script. Reads the store."""
 
 from __future__ import annotations
 
@@ -257,11 +254,7 @@ def _thumbnail_url(pixels: Srgb8Image) -> str:
 
 
 def bin_colours(bins: Iterable[int], space: str) -> NDArray[np.uint8]:
-    """(a * b * c, 3) sRGB of the centre of each colour bin, in the order of the counts.
-
-    bins is the number along each of three channels. For "ycbcr", centres outside the RGB cube are
-    clipped to 0..255; any other space is taken for RGB.
-    """
+    """(a * b * c, 3) sRGB of the bins' centres, clipped for "ycbcr", in the order of the counts."""
     # Enumerate the centres, the first channel slowest.
     axes = [(np.arange(n) + 0.5) * 256 / n for n in bins]
     grid = np.stack(np.meshgrid(*axes, indexing="ij"), axis=-1).reshape(-1, 3)

@@ -79,11 +79,7 @@ def select(
 
 
 def verdict_table(store: Store, run: str = "default") -> Any:
-    """The stored table of a run (scores.SCORES and the columns of verdicts); BadInput if none.
-
-    A pyarrow table with a row per view, including rejected ones with their reason. It dates from the
-    last `pbrs-farm select`: views rendered since are missing.
-    """
+    """The stored table (SCORES, verdicts) of a run, which later views are not in; BadInput without."""
     table = _stored_run(store, run)
     if table is None:
         hint = "`pbrs-farm select` first"
@@ -92,19 +88,13 @@ def verdict_table(store: Store, run: str = "default") -> Any:
 
 
 def house_pack(store: Store, house: str, score_mode: Mode) -> HistogramPack:
-    """The histograms of one house, from its pack if up to date.
-
-    Otherwise it is rebuilt from the views' histograms.
-    """
+    """The histograms of one house, from its pack or, if out of date, from its views."""
     views = _houses(store, house)[house]
     return _house_pack(store, house, views, _source(store, house, views, score_mode), score_mode)
 
 
 def _houses(store: Store, house: str = "") -> dict[str, dict[str, bool]]:
-    """House id -> view id -> True if it has a histogram.json, in order; house: only this one.
-
-    A remote store is not listed if a manifest names its views.
-    """
+    """House id -> view id -> True if it has a histogram.json, in order, by a manifest if there is one."""
     manifest = keys.house_key(house, keys.MANIFEST) if house else keys.MANIFEST
     rows = get_or_none(store, manifest) if isinstance(store, LaidOutStore) else None
     if rows is not None:
@@ -228,11 +218,7 @@ def _write_run(
 
 
 def json_lines(table: Any) -> bytes:
-    """A line of JSON per row; numbers with at most six decimals, null if unknown.
-
-    table is a pyarrow table; the keys of a line are in the order of its columns. Works in batches,
-    since at the paper's scale the result has hundreds of megabytes.
-    """
+    """A line of JSON per row of a pyarrow table, in batches; six decimals at most, null if unknown."""
     names = table.column_names
     opened = [("{" if k == 0 else ",") + json.dumps(name) + ":" for k, name in enumerate(names)]
     file = io.BytesIO()  # getvalue does not copy: at the paper's scale this is 300 MB

@@ -66,11 +66,7 @@ class SelectionSummary(Record):
 def summary_of(
     judged: Any, run: str, fields: SelectionFields, reference: Reference
 ) -> SelectionSummary:
-    """The summary of a table of verdicts.
-
-    judged is the table of verdicts, a row per view. Statistics of scores cover the views with a
-    score; tallies by house and type of room cover all.
-    """
+    """The summary of a table of verdicts: statistics of views with a score, tallies of all."""
     # Views without a score have null there and are excluded from the statistics of scores.
     colour, depth = (judged[k].drop_null().to_numpy() for k in ("colour_score", "depth_score"))
     counts = {r["values"]: r["counts"] for r in pc.value_counts(judged["reason"]).to_pylist()}
@@ -101,11 +97,7 @@ def summary_of(
 
 
 def good_scores(judged: Any) -> tuple[F64, F64]:
-    """Colour and depth scores of the views that only thresholds, caps and balance can reject.
-
-    Two float64 arrays of the same views, without those lacking a score: the candidates of a threshold.
-    A view rejected for several reasons counts only if all of them are among these three.
-    """
+    """Colour and depth scores of the views that at most thresholds, caps and balance reject."""
     of_quality = set(REASONS) - _OF_CHOICE
     is_good = [
         not of_quality.intersection(text.split(",")) for text in judged["reasons"].to_pylist()
@@ -116,11 +108,7 @@ def good_scores(judged: Any) -> tuple[F64, F64]:
 
 
 def yield_curve(scores: F64, n_views: int) -> list[float]:
-    """Share of n_views whose score is above each of THRESHOLDS; zeros without scores.
-
-    scores is (n,), the lesser of colour and depth for both together; n_views counts all views, also
-    those without a score. A score equal to a threshold does not pass it.
-    """
+    """Share of n_views whose score (n,) is above each of THRESHOLDS; zeros without scores."""
     if not len(scores):
         return [0.0] * len(THRESHOLDS)
     # Sort once to count the scores above each threshold.

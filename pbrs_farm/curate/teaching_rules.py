@@ -1,8 +1,4 @@
-"""`pbrs-farm select --by`: rejects uninformative views, by rules about their content.
-
-Effects: reads views of an output folder. Each rule measures a number of a view and has a maximum; a
-view that breaks several rules counts for the first. Nothing is compared with photographs here.
-"""
+"""`pbrs-farm select --by`: reject uninformative views by the first of some rules. Reads views."""
 
 from __future__ import annotations
 
@@ -78,10 +74,7 @@ def plane_share(view: ChosenView) -> float:
 
 
 def cut_share(view: ChosenView) -> float:
-    """Share of the items that the picture's edge cuts; 0 without items.
-
-    Walls, floors, ceilings and items below a hundredth of the picture do not count.
-    """
+    """Share of the items, but structure and tiny ones, that the picture's edge cuts; 0 without items."""
     structure = {kind.value for kind in ItemKind if kind.is_structure}
     things = [
         row
@@ -99,11 +92,7 @@ def darkness(view: ChosenView) -> float:
 
 
 def twin_share(view: ChosenView, other: ChosenView) -> float:
-    """Share of a view's points that another view shows at nearly the same pixel.
-
-    Only for pinhole cameras; 0 for other lenses and for cameras far apart. Not symmetric: a wide
-    view may contain all of a narrow one.
-    """
+    """Share of a pinhole view's points that another, maybe narrower, shows at nearly the same pixel."""
     i, theirs = intrinsics_of(view.facts), intrinsics_of(other.facts)
     near = np.linalg.norm(pose_opencv(view)[:3, 3] - pose_opencv(other)[:3, 3]) < _TWIN_M
     if not (near and i.lens.is_pinhole and theirs.lens.is_pinhole):
@@ -170,10 +159,7 @@ def judged_by(entries: Sequence[ViewEntry], names: Sequence[str]) -> list[RuleVe
 def write_verdicts(
     store: Store, run: str, by: Sequence[str], verdicts: Sequence[RuleVerdict]
 ) -> dict[str, Any]:
-    """Write selection/<run>.jsonl and selection.json; returns the summary stored in selection.json.
-
-    by: names of the rules applied, may be empty. Raises BadInput for an invalid name of the run.
-    """
+    """Write selection/<run>.jsonl and selection.json (whose content is returned); BadInput for a run."""
     key = keys.selection_key(run, "jsonl")
     store.put(key, "".join(verdict.json_line for verdict in verdicts).encode())
     counts = {

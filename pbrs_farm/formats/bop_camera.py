@@ -29,10 +29,7 @@ class _BopCamera(BaseModel):
 
 
 def camera_of_bop(path: Path) -> tuple[tuple[int, int], F64]:
-    """((width, height), K (3, 3)) of a camera.json; its K is relative to the first pixel's centre.
-
-    Raises BadInput, naming the file and the invalid field.
-    """
+    """((width, height), K) of a camera.json, K relative to the first pixel's centre; BadInput."""
     try:
         data = read_regular(path, MAX_TEXT_BYTES)
     except OSError as error:

@@ -17,11 +17,7 @@ _RIGHT: Final = ("stereo", "right")  # the rig of --stereo, and its other camera
 
 
 def cameras_document(views: Iterable[View], report: Mapping[str, Any]) -> dict[str, Any]:
-    """Contents of cameras.json. report: reasons for rejected candidates, as JSON values.
-
-    For callers that extend or print it; the step `cameras` writes `cameras_json`. The views keep their
-    order.
-    """
+    """Contents of cameras.json, views in order; report: reasons for rejected candidates."""
     return {"views": [_json_of_view(view) for view in views], "report": report}
 
 

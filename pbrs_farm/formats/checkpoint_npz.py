@@ -1,7 +1,4 @@
-"""unfinished/<step>.<view>.npz: what a render under way has kept, gone when its view is done; no effects.
-
-Arrays named `<part>/<name>`, beside the digest of the step they belong to and the seconds they took.
-"""
+"""unfinished/<step>.<view>.npz: a render under way, arrays `<part>/<name>`, digest, seconds; no effects."""
 
 from __future__ import annotations
 
@@ -38,11 +35,7 @@ def checkpoint_npz(parts: KeptParts) -> bytes:
 
 
 def checkpoint_from_npz(data: bytes) -> KeptParts | None:
-    """Inverse of checkpoint_npz; None for any other data.
-
-    Damage costs the work, not the run: a caller that gets None starts from the beginning. Whether the
-    checkpoint belongs to the current work is not tested here: compare `digest`.
-    """
+    """Inverse of checkpoint_npz, whose `digest` the caller compares; None for damaged data."""
     try:
         with np.load(io.BytesIO(data), allow_pickle=False) as file:
             arrays = {name: file[name] for name in file.files}

@@ -55,11 +55,7 @@ class ClassRule:
     name: str
 
     def fits(self, instance: Mapping[str, Any]) -> bool:
-        """True if an instance of view.json (class, kind, source_class, name) matches.
-
-        Case-insensitive. A word with wildcards (`*`, `?`, `[`) is matched as a file name, against the names
-        alone; a plain one must equal one of the fields.
-        """
+        """True if a word, in any case, equals an instance's field, or with wildcards matches its name."""
         if _WILD.isdisjoint(self.word):
             return any(str(instance.get(f, "")).lower() == self.word for f in _FIELDS)
         return any(fnmatchcase(str(instance.get(f, "")).lower(), self.word) for f in _NAMES)
@@ -89,10 +85,7 @@ class ClassMap:
     def label(
         self, instance: NDArray[Any], instances: Sequence[Mapping[str, Any]]
     ) -> NDArray[np.uint16]:
-        """(H, W) uint16 classes of a map of instance ids (H, W), as in instance.png, and its rows in view.json.
-
-        An id without a row becomes 0.
-        """
+        """(H, W) uint16 classes of instance ids by the map and the rows in view.json; 0 without a row."""
         table = np.zeros(max([int(instance.max(initial=0)), *(r["id"] for r in instances)]) + 1)
         for row in instances:
             table[row["id"]] = self.id_of(row)

@@ -17,12 +17,7 @@ _DEFAULT_FPS: Final = 30.0  # of frames without times
 
 
 def film(pictures: Iterable[Srgb8Image], fps: Fraction) -> bytes:
-    """An mp4 file (H.264, 4:2:0) of pictures (H, W, 3) of one size; an odd row or column is cut off.
-
-    pictures are uint8 sRGB, encoded one by one as they come, so a long film needs little memory;
-    the first decides the size. One thread encodes, so the same pictures give the same bytes with
-    the same libraries. Needs PyAV.
-    """
+    """An mp4 file (H.264, 4:2:0, even size, the same bytes each time) of uint8 sRGB pictures (H, W, 3)."""
     need("av")
     import av
 

@@ -54,11 +54,7 @@ class GlbWriter:
         self.accessors: list[dict[str, Any]] = []  # a view each, with type and count
 
     def add_bytes(self, data: bytes, *, target: int | None = None) -> int:
-        """Index of a new buffer view that holds data.
-
-        target: glTF's number for vertices or indices, None for pictures and the like. The view
-        begins at a multiple of four bytes; the padding is not part of its length.
-        """
+        """Index of a new, aligned buffer view of data; target: glTF's number for vertices or indices."""
         # Begin every view at a multiple of four bytes, as accessors of floats need it.
         view = {"buffer": 0, "byteOffset": len(self._binary), "byteLength": len(data)}
         if target is not None:
@@ -68,11 +64,7 @@ class GlbWriter:
         return len(self.views) - 1
 
     def add_vertices(self, array: F32, *, with_bounds: bool = False) -> int:
-        """Index of a new accessor over array (N, 2 or 3) float32, N >= 1.
-
-        with_bounds: for positions, whose minimum and maximum glTF requires. Values are written unchecked:
-        reject non-finite numbers before, since viewers reject the file and `glb` raises on its bounds.
-        """
+        """Index of a new accessor over finite float32 (N >= 1, 2 or 3); with_bounds: for positions."""
         # Give bounds where glTF asks for them: of positions.
         accessor = {
             "bufferView": self.add_bytes(_little(array, "<f4"), target=_ARRAY_BUFFER),
@@ -87,11 +79,7 @@ class GlbWriter:
         return len(self.accessors) - 1
 
     def add_faces(self, faces: I32) -> int:
-        """Index of a new accessor over the vertex numbers of faces (F, 3), F >= 1.
-
-        faces: int32, vertex numbers from 0, written as 32-bit unsigned ones; they are not checked
-        against the vertices.
-        """
+        """Index of a new accessor over the unchecked vertex numbers of faces (F >= 1, 3)."""
         self.accessors.append(
             {
                 "bufferView": self.add_bytes(_little(faces, "<u4"), target=_ELEMENT_ARRAY_BUFFER),
@@ -103,11 +91,7 @@ class GlbWriter:
         return len(self.accessors) - 1
 
     def glb(self, document: dict[str, Any]) -> bytes:
-        """The file: document (without empty lists, as glTF requires) with buffers, and the binary.
-
-        document: glTF without accessors, bufferViews and buffers, which are generated. Keys are sorted, so
-        equal content gives equal bytes. Raises ValueError for a non-finite number.
-        """
+        """The file: document with buffers, keys sorted, without empty lists; ValueError for a non-finite number."""
         # Chunks are padded to 4 bytes: JSON with spaces, the binary one with zeros.
         text = json.dumps(
             self._whole(document), sort_keys=True, separators=(",", ":"), allow_nan=False
@@ -137,11 +121,7 @@ def _little(array: NDArray[Any], dtype: str) -> bytes:
 
 
 def gltf_from_glb(data: bytes, file: str) -> Gltf:
-    """Document and binary chunk of a GLB.
-
-    Accessors are not looked at yet: Gltf reads them when asked. file: for messages. Raises BadHouse
-    where it is damaged, cut short or no glTF 2.0.
-    """
+    """Document and binary chunk of a GLB 2.0, accessors unread; BadHouse for damage."""
     # Header: magic, version, length of the file.
     if len(data) < 20 or data[:4] != _MAGIC:
         raise BadHouse(file, "", "is not a GLB file")
@@ -182,11 +162,7 @@ def entry(gltf: Gltf, kind: str, index: Any) -> dict[str, Any]:
 
 
 def count(gltf: Gltf, holder: dict[str, Any], key: str, place: str, default: int = 0) -> int:
-    """holder[key] as a count >= 0, by default `default`; BadHouse for any other value.
-
-    A missing key gives the default. A bool, a float or a negative number raises too; place (as
-    "accessors[3]") and key locate it in the message.
-    """
+    """holder[key], or default, as a whole number >= 0; BadHouse names place (as "accessors[3]") and key."""
     value = holder.get(key, default)
     if not isinstance(value, int) or isinstance(value, bool) or value < 0:
         raise BadHouse(gltf.file, f"{place}.{key}", f"expected a count, got {str(value)[:40]}")
@@ -194,11 +170,7 @@ def count(gltf: Gltf, holder: dict[str, Any], key: str, place: str, default: int
 
 
 def view_bytes(gltf: Gltf, index: Any) -> bytes:
-    """The bytes of buffer view index; BadHouse if it reaches outside its buffer.
-
-    Copied out of the buffer, so that a caller may keep it. A byteStride is not applied: it is
-    whoever reads the accessor that steps through the view.
-    """
+    """A copy of the bytes of buffer view index, strides unapplied; BadHouse if it leaves its buffer."""
     # Check every number: the file may be a stranger's.
     place = f"bufferViews[{index}]"
     view = entry(gltf, "bufferViews", index)

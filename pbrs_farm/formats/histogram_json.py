@@ -1,7 +1,4 @@
-"""histogram.json: all that selection needs of a view, so that no picture is opened again; no effects.
-
-Written by the step `view`, read by `select`.
-"""
+"""histogram.json, by the step `view`: all that `select` needs of a view instead of its pictures; no effects."""
 
 from __future__ import annotations
 
@@ -103,9 +100,5 @@ class ViewRecord(Record):
 
 
 def record_from_json(data: bytes, name: str) -> ViewRecord:
-    """The record in a histogram.json; BadInput, naming the file, for any other content.
-
-    name: of the file, for the message. A record of another shape (an older version's, or cut short) raises
-    too, with the advice to render the view again.
-    """
+    """The record in a histogram.json of that name; BadInput, with advice, for any other content."""
     return checked(ViewRecord, data, name, hint="render the view again")

@@ -26,10 +26,7 @@ FORMAT: Final = "pbrs_farm house 1"
 
 
 def bundle_from_house(house: House) -> tuple[bytes, bytes]:
-    """(house.glb, house.json) of house; equal houses give equal bytes.
-
-    Raises BadHouse naming the item whose geometry is not finite or whose faces are out of range.
-    """
+    """(house.glb, house.json), equal for equal houses; BadHouse for unsound geometry."""
     # Tie the two files together by the digest of the binary one.
     glb_bytes = glb_from_house(house)
     data = _json_of_house(house)
@@ -87,11 +84,7 @@ def _json_of_item(item: Item, instance: int) -> dict[str, Any]:
 
 
 def house_from_bundle(glb_data: bytes, json_data: bytes) -> House:
-    """The House of a bundle; inverse of bundle_from_house.
-
-    Raises BadHouse, naming house.json or house.glb and the damaged place, and if the two files do not
-    belong together.
-    """
+    """The House of a bundle; BadHouse for damage or files of different houses."""
     data = json_from_bytes(json_data, "house.json")
     if not isinstance(data, dict) or data.get("format") != FORMAT:
         raise BadHouse("house.json", "format", f"expected {FORMAT!r}; this is not a house bundle")

@@ -1,7 +1,4 @@
-"""A House as the bytes of a GLB that any glTF viewer opens; no effects.
-
-glTF measures v downwards. Textures repeat, so v is stored negated, which loses no bit.
-"""
+"""A House as the bytes of a GLB that any glTF viewer opens, v stored negated; no effects."""
 
 from __future__ import annotations
 
@@ -32,10 +29,7 @@ _PANE_ALPHA: Final = 0.3  # of glass whose source says opaque
 
 
 def glb_from_house(house: House) -> bytes:
-    """house.glb: a node per item (in order), a primitive per surface that has vertices.
-
-    Raises BadHouse naming the item whose geometry is not finite or whose faces are out of range.
-    """
+    """house.glb: a node per item, a primitive per surface with vertices; BadHouse for unsound geometry."""
     writer = glb.GlbWriter()
     meshes: list[dict[str, Any]] = []
     nodes = []
@@ -66,11 +60,7 @@ def glb_from_house(house: House) -> bytes:
 
 
 def gltf_asset(house: House) -> dict[str, Any]:
-    """asset of a file made from house, with its source and the credit that it asks for.
-
-    Its "extras" hold all of house.source; "copyright" is there only where the source names an
-    attribution, an author or a licence.
-    """
+    """asset of a file made from house: source in "extras", and "copyright" if it names any credit."""
     source = house.source
     asset: dict[str, Any] = {
         "version": "2.0",
@@ -82,10 +72,7 @@ def gltf_asset(house: House) -> dict[str, Any]:
 
 
 def item_extras(item: Item, instance: int) -> dict[str, Any]:
-    """extras of an item's node: kind, class and properties.
-
-    instance: the item's id in instance.png, its index in the house plus one.
-    """
+    """extras of an item's node: kind, class, properties; instance: its id in instance.png."""
     return {
         "instance": instance,
         "item": item.id,
@@ -145,11 +132,7 @@ def write_textures(
 
 
 def gltf_material(material: Material, images: dict[str, int]) -> dict[str, Any]:
-    """A material; images: texture id -> index of the glTF texture.
-
-    Colours become linear, as glTF requires; the kind is in "extras". Refraction, lamps' power and other
-    properties outside glTF's core are omitted; readers take them from the extras.
-    """
+    """A material, linear as glTF requires, kind in "extras"; images: texture id -> glTF index."""
     alpha, mode = _alpha(material)
     # Say what glTF knows of the material: colour, metal or not, roughness.
     pbr: dict[str, Any] = {

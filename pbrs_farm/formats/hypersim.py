@@ -37,10 +37,7 @@ _SHOWN: Final = 0.8
 
 
 def frame_file(camera: str, frame: int, folder: str, name: str) -> str:
-    """A frame's file below its scene: `images/scene_cam_00_geometry_hdf5/frame.0000.semantic.hdf5`.
-
-    folder: "final_hdf5", "final_preview" or "geometry_hdf5"; name: with its suffix.
-    """
+    """A file of a frame: `images/scene_cam_00_<folder>/frame.0000.<name>`, name with suffix."""
     return f"images/scene_{camera}_{folder}/frame.{frame:04d}.{name}"
 
 
@@ -101,10 +98,7 @@ def signed_ids(ids: NDArray[Any]) -> NDArray[Any]:
 
 
 def preview(colour: F32, has_surface: NDArray[np.bool_]) -> NDArray[np.uint8]:
-    """(H, W, 3) uint8: linear colour with the tone mapping of Hypersim's repository.
-
-    A tenth of the pixels with a surface is brighter than 0.8, before the power of 1 / 2.2.
-    """
+    """(H, W, 3) uint8 by Hypersim's tone mapping: a tenth of the pixels with a surface above 0.8."""
     brightness = (colour @ np.array([0.3, 0.59, 0.11], np.float32))[has_surface]
     scale, now = 1.0, float(np.percentile(brightness, _PERCENTILE)) if brightness.size else 0.0
     if brightness.size:

@@ -1,7 +1,4 @@
-"""illuminance.json: how bright every room's floor is, one a house, written by `illuminance`; no effects.
-
-No step reads the file: `light` repeats a room's row from the step's marker.
-"""
+"""illuminance.json of the step `illuminance`: the light on every room's floor, for people; no effects."""
 
 from __future__ import annotations
 

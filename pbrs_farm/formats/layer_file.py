@@ -16,11 +16,7 @@ from pbrs_farm.images import array_from_png, exr_from_layers, layers_from_exr, p
 
 
 def layer_bytes(name: str, array: NDArray[Any], attribution: str = "") -> bytes:
-    """The file of a layer: PNG or EXR, as its row in core/layers.py says.
-
-    array: (H, W) or (H, W, C) in the row's type. attribution: the file's copyright. Equal arrays
-    give equal bytes.
-    """
+    """The PNG or EXR of a layer's (H, W[, C]) array in its row's type; attribution: its copyright."""
     layer = LAYER[name]
     if layer.file.endswith(".png"):
         return png_from_array(array, attribution=attribution)
@@ -33,10 +29,7 @@ def layer_bytes(name: str, array: NDArray[Any], attribution: str = "") -> bytes:
 
 
 def layer_from_bytes(name: str, data: bytes, place: str) -> NDArray[Any]:
-    """The array that layer_bytes wrote: (H, W) or (H, W, C), in the type of the layer's row.
-
-    Half floats come as float32; radiance.exr as all its light, (H, W, 3). place: for messages. Raises BadInput where data is no such file.
-    """
+    """The array of layer_bytes, half floats as float32, radiance.exr as all its light; BadInput."""
     layer = LAYER[name]
     if layer.file.endswith(".png"):
         return array_from_png(data, place)

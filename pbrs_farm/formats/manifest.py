@@ -12,10 +12,7 @@ from pbrs_farm.formats.marker import Marker
 
 
 def manifest_from_markers(markers: Iterable[Marker], attribution: str) -> bytes:
-    """The manifest of a house from the markers of its steps, sorted by key.
-
-    A line is an object: key, bytes, sha256, step, digest and, where one is due, the attribution.
-    """
+    """The manifest of a house's markers, by key, a line each: bytes, sha256, step, digest, credit."""
     credit = {"attribution": attribution} if attribution else {}
     rows: list[dict[str, str | int]] = [
         {

@@ -45,11 +45,7 @@ class Marker(Record):
 
 
 def read_marker(store: Store, key: str) -> Marker | None:
-    """The marker at key; None if the step is not done.
-
-    The marker lists the step's files with digests. Raises StoreFailed for a damaged marker, which is
-    different from an absent one.
-    """
+    """The marker at key; None if the step is not done. StoreFailed for a damaged one."""
     data = get_or_none(store, key)
     try:
         return None if data is None else Marker.model_validate_json(data)

@@ -1,7 +1,4 @@
-"""Houses and views of a finished output folder, as plain values. Effects: reads files.
-
-The layout is that of docs/formats.md; pictures are not opened here.
-"""
+"""Houses and views of a finished output folder (docs/formats.md), as plain values. Reads files."""
 
 from __future__ import annotations
 
@@ -66,10 +63,7 @@ class ViewEntry:
 
 
 def views_of(root: Path) -> tuple[ViewEntry, ...]:
-    """Every view below root/houses, then root/objects, by house and view id.
-
-    Raises BadInput if root is no output folder or a JSON file in it cannot be read.
-    """
+    """Every view below root/houses, then root/objects, by id; BadInput for no or a damaged folder."""
     if (root / LAYOUT).is_file():
         hint = "pbrs-farm pull ROOT --out FOLDER, then use FOLDER"
         raise BadInput(root, LAYOUT, "its views are packed, but files are needed", hint=hint)
@@ -135,10 +129,7 @@ def _room_id(view_id: str, facts: dict[str, Any], house: OutputHouse) -> str:
 
 
 def reasons_of(root: Path) -> dict[tuple[str, str], str]:
-    """(house id, view id) -> "" where kept, else why refused, of the last selection; {} if none.
-
-    Raises BadInput when the selection's files are damaged.
-    """
+    """(house id, view id) -> "" or the reason, of the last selection, or {}; BadInput if damaged."""
     run = json_object(root / keys.SELECTION).get("run")
     if not run:
         return {}

@@ -33,11 +33,7 @@ def pairs_parquet(rows: Sequence[Mapping[str, Any]]) -> bytes:
 
 
 def pairs_from_parquet(data: bytes, place: str) -> list[dict[str, Any]]:
-    """Inverse of pairs_parquet; BadInput names place for any other data.
-
-    Columns of a later version are ignored; a missing one is an error. The table is held in memory as dicts:
-    for millions of pairs read the file with pyarrow instead.
-    """
+    """Inverse of pairs_parquet, all in memory, unknown columns ignored; BadInput names place."""
     try:
         table = pq.read_table(io.BytesIO(data))
         rows: list[dict[str, Any]] = table.select(list(COLUMNS)).to_pylist()

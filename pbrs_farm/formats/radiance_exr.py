@@ -24,10 +24,7 @@ def _channels(image: str) -> str:
 
 
 def radiance_exr(images: Mapping[str, F32], *, attribution: str = "") -> bytes:
-    """The file of images by name, (H, W, 3) float32 each, of one size; attribution: the file's copyright.
-
-    Channels are "<name>." and a letter; values are linear.
-    """
+    """The file of linear images (H, W, 3) by name, channels "<name>.R"; attribution: its copyright."""
     planes = {
         f"{name}.{channel}": image[..., k]
         for name, image in images.items()
@@ -59,9 +56,5 @@ class RadianceExr:
 
 
 def radiance_from_exr(data: bytes, place: str) -> RadianceExr:
-    """Inverse of radiance_exr; BadInput names place for data that is not an EXR.
-
-    place: file name or key, for messages. All layers are decoded at once; missing ones are reported by
-    `image`.
-    """
+    """Inverse of radiance_exr, all layers decoded; BadInput names place (a file or key)."""
     return RadianceExr(layers_from_exr(data, place), place)

@@ -55,11 +55,7 @@ def recipe_from_toml(path: Path, overrides: Mapping[str, str]) -> Recipe:
 
 
 def toml_from_recipe(recipe: Recipe) -> str:
-    """The recipe as a file; inverse of recipe_from_toml.
-
-    Every value is written, including defaults of its base recipe, so that a later change of defaults does
-    not change the file's meaning; unset values are omitted.
-    """
+    """The recipe as a file, every set value written, defaults of today too."""
     fields = recipe.model_dump(mode="json", exclude={"name"})
     lines = [f'recipe = "{recipe.name}"']
     # Values of the recipe itself precede its groups.

@@ -29,10 +29,7 @@ _MAX_BYTES: Final = 2**20
 
 
 def rig_from_toml(path: Path) -> RigFields:
-    """The rig of a file; a file without a name is called by its own.
-
-    Raises BadInput, naming file and key, for a file that cannot be read, is no TOML, or is no rig.
-    """
+    """The rig of a file, called by the file unless named; BadInput names file and key."""
     try:
         data = read_regular(path, _MAX_BYTES)
     except OSError as error:

@@ -50,10 +50,7 @@ def _list_from_array(value: Any) -> Any:
 
 
 def json_bytes(value: Any) -> bytes:
-    """Readable JSON, keys sorted, a newline at the end: equal values give equal bytes.
-
-    value: a pydantic model, or JSON values. Floats read back to the same bits.
-    """
+    """Readable JSON of a model or values, keys sorted, a newline at the end: equal for equal values."""
     if isinstance(value, BaseModel):
         value = value.model_dump(mode="json")
     return (json.dumps(value, sort_keys=True, indent=1, ensure_ascii=False) + "\n").encode(

@@ -56,11 +56,7 @@ def view_json(description: Mapping[str, Any]) -> bytes:
 
 
 def lamps_from_view_json(data: bytes, place: object) -> list[dict[str, Any]]:
-    """The rows of the house's lamps (transport/lamp_layers.py); BadInput names place if none.
-
-    The light of single lamps is stored only by runs that ask for it: BadInput then says with which
-    command to render it.
-    """
+    """The rows of the house's lamps; BadInput, with the command that stores light by lamp."""
     try:
         rows: list[dict[str, Any]] = json.loads(data)["modes"]["light"]["lamps"]
     except (ValueError, KeyError, TypeError):

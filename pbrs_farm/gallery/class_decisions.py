@@ -1,8 +1,4 @@
-"""Which rule decided the class of each item of a house; no effects.
-
-Readers that guess write the rule into the item's tags ("class:name"); other items have the
-class that their source gives them.
-"""
+"""Which rule decided the class of each item of a house, by its tag "class:name", if any; no effects."""
 
 from __future__ import annotations
 
@@ -31,10 +27,7 @@ class ClassDecision(Record):
 
 
 def class_decisions(items: Iterable[Mapping[str, Any]]) -> tuple[ClassDecision, ...]:
-    """The decisions behind the items' classes, least reliable first, without walls and floors.
-
-    items: rows as in house.json.
-    """
+    """The decisions behind the classes of house.json's items but walls and floors, worst first."""
     counts = Counter(
         (_rule(i), int(i.get("nyu40", 0)), str(i.get("name", "")), str(i.get("source_class", "")))
         for i in items
@@ -55,11 +48,7 @@ def class_decisions(items: Iterable[Mapping[str, Any]]) -> tuple[ClassDecision, 
 
 
 def decisions_text(decisions: tuple[ClassDecision, ...]) -> str:
-    """The decisions as a Markdown table, with the number of items per rule.
-
-    Rows keep their order. The last line counts the items of class otherprop, since some of their names
-    may deserve a better class.
-    """
+    """The decisions, and their number per rule, as a Markdown table; otherprop is counted last."""
     by_rule = Counter[str]()
     for d in decisions:
         by_rule[d.rule] += d.n_items

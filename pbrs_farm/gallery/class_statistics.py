@@ -38,10 +38,7 @@ class ClassStatistics(Record):
     decisions: tuple[ClassDecision, ...] = ()  # decisions over all houses
 
     def text(self) -> str:
-        """The statistics as a Markdown table and a list.
-
-        Sections for unmapped names and decisions are left out if empty.
-        """
+        """The statistics as a Markdown table and lists of unmapped names and decisions, if any."""
         lines = [
             f"{self.n_views} views, {self.classes_per_image:.1f} classes a view",
             "",
@@ -62,10 +59,7 @@ class ClassStatistics(Record):
 
 
 def class_statistics(folder: Path) -> ClassStatistics:
-    """Count the classes of every finished view below folder; classes never seen are left out.
-
-    Raises BadInput if folder holds no view with labels, or a label picture cannot be read.
-    """
+    """Count the seen classes of every finished view below folder; BadInput without labels."""
     views = [v for v in views_of(folder) if v.file("semantic.png") and "instances" in v.facts]
     if not views:
         raise BadInput(folder, "", "no finished view with labels")

@@ -83,11 +83,7 @@ def contact_sheet(
 
 
 def spread_views(views: Sequence[ViewEntry], max_views: int) -> list[ViewEntry]:
-    """Choose at most max_views of views, in turn from each house and, within it, from each room.
-
-    The result keeps the order of views. With fewer rooms than max_views, several views of a room are
-    taken. The choice is deterministic.
-    """
+    """At most max_views of views, in order, from each house and room in turn."""
     # Group by house and room.
     rooms: dict[str, dict[str, list[ViewEntry]]] = defaultdict(lambda: defaultdict(list))
     for view in views:
@@ -211,10 +207,7 @@ def _draw_legend(draw: ImageDraw.ImageDraw, y: int, rows: Sequence[Sequence[_Chi
 
 
 def before_after_png(before: Srgb8Image, after: Srgb8Image, caption: str) -> bytes:
-    """PNG of two pictures (H, W, 3) of one size, before on the left, and a caption below.
-
-    A long caption takes several lines: credits are shown whole.
-    """
+    """PNG of two pictures (H, W, 3) side by side, and a caption, its credits whole, below."""
     height, width = before.shape[:2]
     # A letter of size 12 is about 6 px wide.
     most = max(20, (2 * width) // 6)

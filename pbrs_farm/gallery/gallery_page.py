@@ -49,11 +49,7 @@ class CardTiles:
 
 
 def card_tiles(tiles: Sequence[Tile]) -> CardTiles:
-    """Tiles of at most THUMBNAIL_PX as a view's card shows them.
-
-    Pictures become data URLs, so a card needs no file beside the page. The classes are those of the
-    first tile that has some, the shape (H, W) that of the first with pixels.
-    """
+    """Tiles of at most THUMBNAIL_PX for a card, as data URLs; classes and shape of the first with any."""
     rows = tuple(
         {"kind": t.kind, "note": t.note, "missing": t.missing, "source": _tile_url(t)}
         for t in tiles
@@ -66,10 +62,7 @@ def card_tiles(tiles: Sequence[Tile]) -> CardTiles:
 def gallery_pages(
     folder: Path, cards: Mapping[Path, CardTiles] | None = None
 ) -> Iterator[tuple[str, str]]:
-    """(file name, HTML) of each page, made one at a time. Raises BadInput as gallery.
-
-    cards: view folder -> existing card_tiles.
-    """
+    """(file name, HTML) of each page in turn; cards: view folder -> card_tiles. BadInput as gallery."""
     views, reasons = best_first(views_of(folder)), reasons_of(folder)
     n_pages = max(1, -(-len(views) // PAGE_VIEWS))
     for number in range(1, n_pages + 1):
@@ -77,10 +70,7 @@ def gallery_pages(
 
 
 def gallery(folder: Path) -> str:
-    """HTML of the first page (written as folder/index.html its links are right).
-
-    Raises BadInput if folder is no output folder. Full pictures are linked, never embedded.
-    """
+    """HTML of the first page, full pictures linked relative to folder; BadInput for no output folder."""
     return next(gallery_pages(folder))[1]
 
 
@@ -125,10 +115,7 @@ def _near_pages(number: int, n_pages: int) -> list[int]:
 
 
 def best_first(views: Iterable[ViewEntry]) -> list[ViewEntry]:
-    """The views house by house, each with its best room first, and within it the best view.
-
-    Ordered by score; views left black by daylight come last. Frames of a sequence keep their order.
-    """
+    """Views by house, best room and view first, black ones last; frames of a sequence in order."""
     houses: dict[str, dict[str, list[ViewEntry]]] = {}
     for view in views:
         houses.setdefault(view.house.id, {}).setdefault(view.room_id, []).append(view)
@@ -190,18 +177,12 @@ def _tile_url(tile: Tile) -> str:
 
 
 def data_url(data: bytes, kind: str) -> str:
-    """The bytes of a picture as a data URL; kind: "png" or "jpeg".
-
-    For self-contained pages. A third longer than the bytes.
-    """
+    """The bytes of a picture ("png" or "jpeg") as a data URL, a third longer."""
     return f"data:image/{kind};base64,{base64.b64encode(data).decode()}"
 
 
 def small_jpeg(pixels: Srgb8Image, max_bytes: int) -> bytes:
-    """JPEG bytes at the best of four qualities within max_bytes; else scaled down.
-
-    Below 16 px an edge the result may be larger than max_bytes.
-    """
+    """JPEG bytes at the best of four qualities within max_bytes, else scaled down to 16 px."""
     for quality in (84, 74, 62, 48):
         data = images.jpeg_from_array(pixels, quality)
         if len(data) <= max_bytes:

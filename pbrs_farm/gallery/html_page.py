@@ -11,20 +11,13 @@ from pbrs_farm.core.shown_text import printable
 
 
 def page(package: str, template: str, **values: Any) -> str:
-    """The template file of a package filled with values; only markupsafe.Markup is not escaped.
-
-    Raises jinja2.UndefinedError for a name the template uses and values lacks.
-    """
+    """The template file of a package filled with escaped values (but Markup); jinja2.UndefinedError."""
     return compile_template(package, template).render(values)
 
 
 @functools.cache
 def compile_template(package: str, template: str) -> Template:
-    """The template file of a package, ready to be filled; each is compiled once a process.
-
-    Names in the template that are not given when it is filled are errors, and all text is escaped
-    but markupsafe.Markup. `page` fills one in a single call.
-    """
+    """The template file of a package, compiled once; missing names are errors, text is escaped."""
     environment = Environment(
         loader=PackageLoader(package, ""),
         autoescape=True,

@@ -19,11 +19,7 @@ _NEAR_TO_FAR: Final = np.array(
 
 
 def depth_range_m(depth_mm: NDArray[np.integer]) -> tuple[float, float]:
-    """Metres of the 1st and 99th percentile of the valid depths; (0, 1) if none is valid.
-
-    depth_mm is an array of any shape, whole millimetres, 0 = unknown. The range is at least 1 mm, so
-    that it can be a divisor. With percentiles, one far window does not darken a room.
-    """
+    """Metres, 1 mm apart at least, of the 1st and 99th percentile of mm above 0; (0, 1) without."""
     valid = depth_mm[depth_mm > 0]
     if not valid.size:
         return 0.0, 1.0
@@ -34,10 +30,7 @@ def depth_range_m(depth_mm: NDArray[np.integer]) -> tuple[float, float]:
 def depth_colours(
     depth_mm: NDArray[np.integer], near_m: float | None = None, far_m: float | None = None
 ) -> Srgb8Image:
-    """(H, W, 3): pale = near, dark blue = far, grey = no depth (0).
-
-    near_m, far_m: the ends of the scale; depth_range_m of the picture when None.
-    """
+    """(H, W, 3): pale = near_m, dark blue = far_m (default: depth_range_m), grey = no depth (0)."""
     # Scale to 0..1, then look up a ramp of 256 colours.
     low, high = depth_range_m(depth_mm)
     low = low if near_m is None else near_m
@@ -54,19 +47,12 @@ def depth_colours(
 
 
 def semantic_colours(nyu40: NDArray[np.integer]) -> Srgb8Image:
-    """(H, W, 3) uint8 colours of NYU40 ids (H, W); ids above 40 get the colour of no class.
-
-    The colours are NYU40_COLOURS of core/classes.py, as in dataset.json and COCO's categories.
-    """
+    """(H, W, 3) uint8 NYU40_COLOURS of ids (H, W); ids above 40 get the colour of no class."""
     return NYU40_COLOURS[np.where(nyu40 > 40, 0, nyu40)]
 
 
 def instance_colours(instance: NDArray[np.integer]) -> Srgb8Image:
-    """(H, W, 3) a colour per instance id, the same in every view; neighbouring ids differ clearly.
-
-    instance is (H, W), 0 = nothing, which has the colour of no class. In large scenes two distant ids
-    may look alike: do not decode ids from colours.
-    """
+    """(H, W, 3) a colour per instance id (0 = nothing), alike in all views, not to be decoded."""
     ids = np.arange(int(instance.max(initial=0)) + 1)
     # Step hues by the golden ratio, and vary value and saturation, so neighbours differ.
     hue = (ids * 0.61803398875) % 1.0
@@ -80,10 +66,7 @@ def instance_colours(instance: NDArray[np.integer]) -> Srgb8Image:
 
 
 def flow_colours(flow: NDArray[Any], most_px: float | None = None) -> Srgb8Image:
-    """(H, W, 3): hue = direction of (H, W, 2) motion, saturation = distance; white = no motion.
-
-    most_px: motion at full saturation; the 99th percentile of the picture when None.
-    """
+    """(H, W, 3): hue = direction, saturation = distance up to most_px (99th percentile); white = none."""
     length = np.linalg.norm(flow, axis=-1)
     most = max(float(np.percentile(length, 99)), 0.5) if most_px is None else most_px
     share = np.clip(length / most, 0, 1)[..., None]
@@ -94,11 +77,7 @@ def flow_colours(flow: NDArray[Any], most_px: float | None = None) -> Srgb8Image
 
 
 def normal_colours(normal_label: NDArray[Any]) -> Srgb8Image:
-    """(H, W, 3) uint8 of a normal layer as stored (16-bit RGB); only the precision is lost.
-
-    normal_label is (H, W, 3 or more), uint16 as stored or uint8. The axes are the layer's own: x
-    right, y forward, z up in the published convention.
-    """
+    """(H, W, 3) uint8 of a normal layer as stored, in its own axes (x right, y forward, z up)."""
     if normal_label.dtype == np.uint8:
         return np.asarray(normal_label[..., :3], np.uint8)
     return np.asarray(normal_label[..., :3] >> 8, np.uint8)
@@ -111,10 +90,7 @@ def boundary_colours(boundary: NDArray[np.uint8]) -> Srgb8Image:
 
 
 def shown_colours(layer: Layer, stored: NDArray[Any]) -> Srgb8Image:
-    """(H, W, 3) uint8 sRGB of a layer's stored array, drawn by layer.shown_as.
-
-    Raises KeyError for a layer without a picture (radiance).
-    """
+    """(H, W, 3) uint8 sRGB of a stored array by layer.shown_as; KeyError for radiance."""
     return _SHOWN[layer.shown_as](stored)
 
 

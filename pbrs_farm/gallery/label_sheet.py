@@ -1,7 +1,4 @@
-"""Sheet of one view's labels: over the picture, magnified at an edge, with a legend.
-
-Effects: reads picture files.
-"""
+"""Sheet of one view's labels: over the picture, magnified at an edge, with a legend. Reads pictures."""
 
 from __future__ import annotations
 
@@ -45,11 +42,7 @@ def label_sheet(view: ViewEntry) -> Srgb8Image:
 
 
 def legend(semantic: NDArray[Any], width_px: int) -> Srgb8Image:
-    """(H', width_px, 3) a row of chips per class in semantic, largest share first.
-
-    semantic is an array of NYU40 ids, of any shape; shares are of all its pixels, 0 included as a
-    class. The height follows from the number of chips per row.
-    """
+    """(H', width_px, 3) chips of the NYU40 ids in semantic, 0 included, largest share first."""
     # List the visible classes, largest first.
     counts = np.bincount(semantic.reshape(-1), minlength=1)
     classes = [int(i) for i in np.argsort(-counts, kind="stable") if counts[i]]

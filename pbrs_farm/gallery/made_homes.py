@@ -70,11 +70,7 @@ def _make(folder: Path, programme: Programme | None, home: MadeHome) -> Done:
 
 
 def write_home(path: Path, home: GeneratedHome) -> None:
-    """Write a home's file and the picture of its plan. Raises BadInput if path has a different home.
-
-    The .svg has the same folder and stem. An existing file must have the same origin and is kept; its
-    picture is drawn again.
-    """
+    """Write (or keep) a home's file, and its plan's .svg; BadInput if path has a different home."""
     if path.exists():
         _check_same(path, home.origin)
     else:
@@ -84,11 +80,7 @@ def write_home(path: Path, home: GeneratedHome) -> None:
 
 
 def plans_page(folder: Path) -> str:
-    """The HTML page of every plan in a folder, in the order of their seeds.
-
-    A plan is listed if both its .svg and its .sh3d exist. Shorter names come first, so that seed 10
-    comes after 9.
-    """
+    """The HTML page of every .svg with an .sh3d in a folder, by length of name, then name."""
     names = [p.stem for p in folder.glob("*.svg") if p.with_suffix(".sh3d").exists()]
     names.sort(key=lambda name: (len(name), name))
     return page("pbrs_farm.gallery", "plans.html", names=names)

@@ -44,10 +44,7 @@ def _small_figure(frame: Frame) -> str:
 
 
 def figure_html(title: str, rgb: NDArray[np.uint8], width_px: int) -> str:
-    """A picture (H, W, 3) sRGB of that width, embedded, with its escaped title below.
-
-    The JPEG has twice the width for dense screens; its pixel values are not exact.
-    """
+    """A picture (H, W, 3) sRGB, width_px wide, as a JPEG for dense screens over its escaped title."""
     small = thumbnail(rgb, max_edge_px=2 * width_px)
     data = base64.b64encode(jpeg_from_array(small)).decode()
     return (

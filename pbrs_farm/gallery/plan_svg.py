@@ -31,10 +31,7 @@ _RAISED_M: Final = 1.2  # height above which furniture is drawn dashed
 
 
 def plan_svg(storeys: Sequence[Storey], title: str, stair: Stair | None = None) -> str:
-    """The text of an SVG file: rooms with names and areas, walls, doors, windows, furniture.
-
-    Storeys are side by side, the lowest on the left; stair: between the first two.
-    """
+    """An SVG of rooms with names and areas, walls, openings, furniture, storeys from left to right."""
     points = [p for storey in storeys for wall in storey.plan.walls for p in wall.corners()]
     x0, z0 = (min(p[k] for p in points) - _MARGIN_M for k in (0, 1))
     x1, z1 = (max(p[k] for p in points) + _MARGIN_M for k in (0, 1))

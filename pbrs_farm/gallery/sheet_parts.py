@@ -1,7 +1,4 @@
-"""Make the parts of sheet and gallery view by view, while other views are rendered.
-
-Effects: a thread, which reads picture files.
-"""
+"""Make parts of sheet and gallery in a thread, view by view, while other views are rendered."""
 
 from __future__ import annotations
 
@@ -33,26 +30,17 @@ class SheetParts:
         self._thread.shutdown(cancel_futures=True)
 
     def make(self, house_id: str, view_id: str) -> None:
-        """Start making the parts of a view in the background; its files must be complete.
-
-        A failure leaves the view without parts and raises nothing.
-        """
+        """Start making the parts of a complete view in the background; a failure leaves it without."""
         folder = self._folder / keys.view_key(house_id, view_id, "view.json")
         view = ViewEntry(OutputHouse(house_id, "", ""), view_id, "", "", folder.parent)
         self._made[view.folder] = self._thread.submit(_part_sizes, view)
 
     def tiles(self) -> dict[Path, Sequence[Tile]]:
-        """View folder -> the tiles of its row, for all views with parts.
-
-        Waits for running parts.
-        """
+        """View folder -> the tiles of its row, for all views with parts, running ones awaited."""
         return {folder: tiles for folder, (tiles, _card) in self._results().items()}
 
     def cards(self) -> dict[Path, CardTiles]:
-        """View folder -> the tiles of its card, for all views with parts.
-
-        Waits for running parts. Smaller than `tiles`, and encoded as a page needs them.
-        """
+        """View folder -> the encoded tiles of its card, for all views with parts, running ones awaited."""
         return {folder: card for folder, (_tiles, card) in self._results().items()}
 
     def _results(self) -> dict[Path, _Parts]:

@@ -60,19 +60,13 @@ class _Layer:
 
 
 def tiles_of(view: ViewEntry, max_edge_px: int = 320) -> tuple[Tile, ...]:
-    """The view's tiles in the order of TILES; missing or damaged tiles give a reason.
-
-    Reads the view's files; no caching. A tile's longer edge has at most max_edge_px.
-    """
+    """The view's tiles, uncached, in the order of TILES, at most max_edge_px; bad ones give a reason."""
     (tiles,) = tiles_of_sizes(view, max_edge_px)
     return tiles
 
 
 def tiles_of_sizes(view: ViewEntry, *max_edges_px: int) -> list[tuple[Tile, ...]]:
-    """As tiles_of, for several sizes: a tuple for each, in order.
-
-    Reads every layer once, so it is cheaper than several calls of tiles_of.
-    """
+    """As tiles_of, a tuple for each size in order, from one reading of the layers."""
     layers = [_shown_layer(view, kind) for kind in TILES]
     return [tuple(layer.tile(edge_px) for layer in layers) for edge_px in max_edges_px]
 

@@ -1,7 +1,4 @@
-"""Sequences of frames as mp4 films: picture, and picture with labels; coded by formats/film_mp4.py.
-
-Effects: reads picture files, keeps a film in memory while it is coded.
-"""
+"""Sequences of frames as mp4 films, with and without labels, in memory while coded. Reads pictures."""
 
 from __future__ import annotations
 
@@ -25,11 +22,7 @@ _LABELS: Final = ("depth", "normal", "semantic", "instance", "flow_forward")
 
 
 def sequences_of(views: Sequence[ViewEntry]) -> dict[str, list[ViewEntry]]:
-    """House id -> the frames of its sequence in order; houses without frames are left out.
-
-    Frames have "frame" in their view.json; of a rig, only the first camera counts. Gaps are not filled:
-    a partly rendered sequence has only its finished frames.
-    """
+    """House id -> its frames in order, of a rig's first camera, finished ones only."""
     walks: dict[str, list[ViewEntry]] = {}
     for view in views:
         if view.facts.get("frame") is not None and not view.shot.eye:
@@ -40,10 +33,7 @@ def sequences_of(views: Sequence[ViewEntry]) -> dict[str, list[ViewEntry]]:
 
 
 def films_of(frames: Sequence[ViewEntry]) -> dict[str, bytes]:
-    """ "picture" and "labels" -> an mp4 file: the frames' picture alone, and with its labels beside it.
-
-    Raises BadInput if a frame has no picture, MachineFailed without PyAV.
-    """
+    """ "picture", "labels" (beside it) -> mp4 of frames; BadInput for a missing picture, MachineFailed."""
     fps = _fps(frames)
     picture = _mode(frames[0])
     depth_m = _depth_range(frames)

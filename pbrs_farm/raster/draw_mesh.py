@@ -33,11 +33,7 @@ class DrawMesh:
 
 
 def mesh_from_house(house: House) -> DrawMesh:
-    """The mesh of every surface of house, panes included; non-finite triangles are dropped.
-
-    Vertices are not shared between surfaces; draws are in the order of items, so an instance id is
-    the item's number from 1. Materials are numbers into the house's list. Positions stay in metres.
-    """
+    """The mesh of every surface, panes too, by instance from 1, without non-finite triangles."""
     vertices: list[F32] = []
     indices: list[NDArray[np.uint32]] = []
     rows: list[tuple[int, int, int, int]] = []
@@ -73,10 +69,7 @@ def mesh_from_house(house: House) -> DrawMesh:
 
 
 def move_item(mesh: DrawMesh, instance: int, item: Item) -> slice:
-    """Update a moved item in the mesh, in place, with its boxes; returns the rows of changed vertices.
-
-    item: the item with that instance id, moved rigidly part by part.
-    """
+    """Update a rigidly moved item in the mesh, in place, with its boxes; the rows of changed vertices."""
     draws = _draws_of_item(item)
     rows = slice(*mesh.item_first[instance - 1 : instance + 1].tolist())
     mesh.vertices[rows] = np.concatenate(

@@ -1,7 +1,4 @@
-"""OpenGL objects of the rasterizer: context, render targets, textures.
-
-Effects: opens an EGL context; all objects belong to it.
-"""
+"""OpenGL objects of the rasterizer, all of one EGL context: render targets, textures."""
 
 from __future__ import annotations
 
@@ -21,10 +18,7 @@ _MAX_TEXTURE_PX: Final = 4096  # every OpenGL 3.3 driver takes as much
 
 
 def n_samples(context: Any, n_wanted: int) -> int:
-    """Samples a pixel: as wanted or what the context can give, 2 at least.
-
-    context: a moderngl context; n_wanted: at least 1.
-    """
+    """Samples a pixel: as wanted or as the context can give, 2 at least."""
     return max(2, min(n_wanted, int(context.max_samples)))
 
 
@@ -76,10 +70,7 @@ def texture_from_pixels(
 
 
 class RenderTarget:
-    """A framebuffer of colour in half floats, multisampled, resolved on read.
-
-    prepass_depth: the depth texture that a first pass over the house fills.
-    """
+    """A framebuffer of multisampled half floats, resolved on read; prepass_depth: of a first pass."""
 
     def __init__(self, context: Any, size: tuple[int, int], samples: int) -> None:
         self._context, self._size = context, size

@@ -73,10 +73,7 @@ def best_lights(lights: F32, low: F64, high: F64, n_best: int) -> I64:
 
 
 def illuminance(points: F64, normals: F64, lights: F32) -> F64:
-    """(N,) illuminance in lx of points (N, 3) with unit normals (N, 3), without shadows.
-
-    lights: (N, K, 16), each point's own. The same formula as in surface.frag.glsl.
-    """
+    """(N,) lx, without shadows, as in surface.frag.glsl, of points and unit normals under lights (N, K, 16)."""
     # Find the nearest point of each light: along a line, or the light's position.
     start, end = lights[..., POSITION].astype(np.float64), lights[..., END].astype(np.float64)
     along, p = end - start, points[:, None]
@@ -96,11 +93,7 @@ def illuminance(points: F64, normals: F64, lights: F32) -> F64:
 
 
 def brightness_scale(house: House, n_best: int) -> float:
-    """Linear brightness of white per lx of lamp light, one number for the whole house.
-
-    It turns the median illuminance of the floors (of all faces in a house without floors), where
-    there is any, into FLOOR_LEVEL. 0 in a house without lights.
-    """
+    """Brightness of white per lx that takes the median floor (or face) to FLOOR_LEVEL; 0 without lights."""
     lights = light_table(house)
     floors = [item for item in house.items if item.kind is ItemKind.FLOOR] or list(house.items)
     points, normals, owner = _spread_points(floors)

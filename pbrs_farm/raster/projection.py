@@ -11,12 +11,7 @@ NEAR_PLANE_M = 0.02  # closer than any camera to a wall
 
 
 def clip_from_world(camera: Camera, far_m: float) -> Matrix4:
-    """(4, 4) world to OpenGL clip space of a pin-hole camera.
-
-    Pixel centres lie at +0.5 in the coordinates of K, row 0 on top, as those of
-    `Camera.rays`: a rasterized pixel and a traced one see the same point. far_m: of
-    `far_plane`. Lenses other than the pin-hole's are not handled.
-    """
+    """(4, 4) world to clip space of a pin-hole camera, pixels as of `Camera.rays`; far_m: `far_plane`."""
     # Shift the principal point: clip space runs from -1 to 1, upwards, across the picture.
     i = camera.intrinsics
     w, h, n, f = i.width_px, i.height_px, NEAR_PLANE_M, far_m
@@ -41,10 +36,7 @@ def far_plane(camera: Camera, low: F64, high: F64) -> float:
 
 
 def boxes_in_view(clip: Matrix4, low: F64, high: F64) -> Bools:
-    """(N,) bool: the box low..high (N, 3) is not wholly outside one plane of the view frustum.
-
-    A box outside by several planes together counts as in view: that costs a draw call and no pixel.
-    """
+    """(N,) bool: the box low..high (N, 3) is not wholly outside one plane of the frustum."""
     # Read the six planes off the clip matrix (Gribb and Hartmann 2001).
     planes = np.concatenate([clip[3] + clip[:3], clip[3] - clip[:3]])
     normal, offset = planes[:, :3], planes[:, 3]

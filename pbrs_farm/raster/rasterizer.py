@@ -106,10 +106,7 @@ class Rasterizer:
         self._textures = [uploaded.get(m.texture_id or "", white) for m in house.materials]
 
     def draw_house(self, house: House) -> None:
-        """Draw the house at another time from now on; uploads only moved vertices.
-
-        house: this renderer's own, whose items may have moved rigidly, part by part (geometry/moving.py).
-        """
+        """Draw the house with rigidly moved parts from now on; uploads only moved vertices."""
         changed = [
             k
             for k, (a, b) in enumerate(zip(self._house.items, house.items, strict=True))
@@ -200,10 +197,7 @@ class Rasterizer:
         return draws[np.argsort(distance, kind="stable")]
 
     def _visible_draws(self, target: RenderTarget, draws: I64, clip: F64) -> I64:
-        """The draws with a visible sample, by occlusion queries in a depth pre-pass.
-
-        A software renderer lights every hidden sample of a multisampled picture.
-        """
+        """The draws with a visible sample, by queries in a pre-pass: hidden ones cost light."""
         # Draw opaque surfaces into the depth texture and count the samples that pass.
         program, vao = self._program("depth", 0)
         _set_uniforms(program, clip_from_world=clip)

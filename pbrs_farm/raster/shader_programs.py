@@ -1,7 +1,4 @@
-"""Shader programs of the OpenGL modes, compiled from the .glsl files beside this module.
-
-Effects: reads package resources, compiles on the given context.
-"""
+"""Shader programs compiled from the .glsl files beside this module, on the given context."""
 
 from __future__ import annotations
 
@@ -62,11 +59,7 @@ def _shader_source(name: str) -> str:
 
 
 class Feature(IntFlag):
-    """Capabilities of a surface's shader; the names are the shader's #defines.
-
-    A software renderer pays for every shader instruction at every pixel, so each combination of features
-    gets the smallest correct program.
-    """
+    """Capabilities of a surface's shader, its #defines, so that each draw has the smallest program."""
 
     GLOSSY = 1  # a specular highlight
     ALPHA_CUTOUT = 2  # the texture's alpha discards fragments
@@ -75,11 +68,7 @@ class Feature(IntFlag):
 
 
 def features_of_material(material: Material, *, is_textured: bool = True) -> int:
-    """The features a material needs, as a sum of bits.
-
-    is_textured: False where the picture of the texture could not be read. Draws with equal features
-    share a program.
-    """
+    """Features of a material as bits; is_textured: False if its picture is unreadable."""
     features = Feature.TEXTURED if is_textured and material.texture_id is not None else Feature(0)
     if material.shininess > 0 and any(material.specular):
         features |= Feature.GLOSSY

@@ -45,11 +45,7 @@ def _material_block(material: Material) -> list[float]:
 
 
 def light_blocks(house: House, n_best: int) -> F32:
-    """(n_items + 1, 4 + 16 n_best) the Lights block of each instance id: its best lights.
-
-    Float32, in std140's layout. Row 0 is of instance 0, nothing, and stays 0. A house with fewer
-    lights than n_best fills the rest with 0; how many count is the row's first number.
-    """
+    """(n_items + 1, 4 + 16 n_best) float32 std140 Lights of each instance: their number, then the best."""
     lights = light_table(house)
     block = np.zeros((len(house.items) + 1, _HEADER_FLOATS + LIGHT_FLOATS * n_best), np.float32)
     if len(lights) and house.items:

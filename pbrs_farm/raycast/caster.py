@@ -59,10 +59,7 @@ class Caster:
 
     @classmethod
     def of_house(cls, house: House, geometry: Geometry | None = None) -> Caster:
-        """The caster of a house, with the holes that pictures cut into its surfaces.
-
-        geometry: of the house, where it is at hand.
-        """
+        """The caster of a house, with the holes of its surfaces; geometry: of the house, if known."""
         return cls(geometry or geometry_from_house(house), cut_outs=cut_outs_of_house(house))
 
     @cached_property
@@ -82,10 +79,7 @@ class Caster:
         return caster
 
     def hit_record(self, camera: Camera, *, skip_faces: Bools | None = None) -> HitRecord:
-        """The first hit of the ray through each pixel's centre (rule 8).
-
-        skip_faces: (F,) bool, faces to ignore: the transparent ones give the hit behind glass.
-        """
+        """The first hit through each pixel's centre (rule 8), behind skip_faces (F,), if given."""
         tracer = self.tracer if skip_faces is None else self._tracer_without(skip_faces)
         return hit_record_from_faces(self.geometry, camera, _faces_of_surface(tracer, camera))
 
@@ -98,11 +92,7 @@ class Caster:
         return np.where(face >= 0, self.geometry.face_item[face], np.uint32(0))
 
     def item_counts(self, cameras: Sequence[Camera]) -> NDArray[np.uint32]:
-        """(n_cameras, n_items + 1) pixels of each item; column 0 counts rays that miss.
-
-        Cameras may differ in size; memory is bounded. At edges single pixels may differ from item_buffer
-        (see JitTracer).
-        """
+        """(n_cameras, n_items + 1) pixels of items, 0 = misses, in bounded memory; edges may differ."""
         if self.tracer is None or not cameras:
             counts = np.zeros((len(cameras), self.n_items + 1), np.uint32)
             for row, camera in enumerate(cameras):
@@ -112,10 +102,7 @@ class Caster:
         return self.tracer.counts(cameras, self.geometry.face_item, self.n_items + 1)
 
     def depth_pictures(self, cameras: Sequence[Camera]) -> F32:
-        """(N, H, W) depth_z in metres at the pixels' centres, 0 = nothing.
-
-        cameras: N of one size. For small pictures: all rays are in memory at once.
-        """
+        """(N, H, W) depth_z in metres of small cameras of one size, 0 = nothing; one launch of rays."""
         return self.item_pictures(cameras)[0]
 
     def item_pictures(self, cameras: Sequence[Camera]) -> tuple[F32, ItemBuffer]:
@@ -176,10 +163,7 @@ class Caster:
 
 
 def cut_outs_of_house(house: House) -> dict[int, CutOut]:
-    """The holes of a house's materials; decodes those pictures alone that may cut any.
-
-    A picture that cannot be decoded is opaque.
-    """
+    """The holes of a house's materials; decodes, if it can, those pictures that may cut any."""
     from pbrs_farm.images import decode_texture
 
     cutting = {m.texture_id or "" for m in house.materials if m.alpha_cutout}

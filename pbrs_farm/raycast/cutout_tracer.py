@@ -29,11 +29,7 @@ Build = Callable[[Bools], RayTracer | None]  # faces to keep (F,) -> their trace
 
 
 class CutOutTracer:
-    """RayTracer of a mesh with cut-out faces.
-
-    Behind a hole, solid faces are traced from the ray's own origin, so that a leaf on a wall hides no part
-    of it, and the others sheet by sheet.
-    """
+    """RayTracer of a mesh with holes: behind one, solid faces from the ray's origin, others by sheet."""
 
     def __init__(self, geometry: Geometry, cut_outs: CutOuts, keep: Bools, build: Build) -> None:
         """keep: (F,) bool, faces that rays may hit; build: makes the tracer of some of them."""

@@ -11,11 +11,7 @@ _SLACK: Final = 64  # values: more than a packet of any processor holds
 
 
 def with_slack(values: NDArray[Any]) -> NDArray[Any]:
-    """A copy of values (N,) with readable memory behind its end.
-
-    Dr.Jit's LLVM kernels read NumPy's memory in whole packets, past the last value: an array at the end of
-    the process' memory would end the process with a segmentation fault.
-    """
+    """A copy of values (N,) with readable memory behind, as Dr.Jit reads whole packets past the last."""
     padded = np.zeros(len(values) + _SLACK, values.dtype)
     padded[: len(values)] = values
     return padded[: len(values)]

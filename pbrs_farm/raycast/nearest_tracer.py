@@ -1,7 +1,4 @@
-"""Ray tracers of subsets of a mesh, and the nearer of two: static and moving faces are traced separately.
-
-Effects: holds the tracers.
-"""
+"""Ray tracers of subsets of a mesh, and of static and moving faces apart; holds the tracers."""
 
 from __future__ import annotations
 
@@ -46,11 +43,7 @@ class PartTracer:
 
 
 class NearestTracer:
-    """The RayTracer of two meshes: of their first hits the nearer one.
-
-    The first is the larger: rays of cameras are traced as packets in both, and again alone only
-    where both are met.
-    """
+    """The RayTracer of two meshes, the larger first: the nearer of their first hits."""
 
     def __init__(self, first: RayTracer, second: RayTracer) -> None:
         self.first, self.second = first, second

@@ -1,7 +1,4 @@
-"""The ray tracer of the scalar variant, ray by ray: the fallback of machines without LLVM; about a million rays a second.
-
-Effects: holds a Mitsuba scene.
-"""
+"""The ray tracer of the scalar variant, for machines without LLVM: a million rays a second; holds a scene."""
 
 from __future__ import annotations
 
@@ -22,11 +19,7 @@ from pbrs_farm.raycast.variant import mitsuba
 
 
 class ScalarTracer:
-    """RayTracer of scalar_rgb; the same answers as JitTracer but for ties.
-
-    About 20 times slower, ray by ray in Python: for machines where neither LLVM nor CUDA is
-    found. Ties are rays through an edge, where either face is right.
-    """
+    """RayTracer of scalar_rgb, 20 times slower; the same answers as JitTracer but for ties."""
 
     def __init__(self, variant: str, positions: F32, faces: I32) -> None:
         self._variant = variant

@@ -30,34 +30,22 @@ class RayTracer(Protocol):
     """Rays against one mesh in a Mitsuba variant; distances are in lengths of the direction."""
 
     def faces_of_camera(self, camera: Camera) -> I32:
-        """(H, W) face hit through each pixel's centre, -1 = nothing.
-
-        int32, numbers of the mesh's faces. Pixels that the lens does not see count as nothing.
-        """
+        """(H, W) face hit through each pixel's centre, -1 = nothing, also without a ray."""
         ...
 
     def first_hit(self, origins: F32, directions: F32, max_distance: F32) -> tuple[F32, I32]:
-        """(N,) distance in lengths of the direction (inf = nothing) and (N,) face (-1 = nothing).
-
-        origins, directions: (N, 3) float32, of any length but 0; max_distance: (N,) float32, maybe infinite.
-        """
+        """(N,) distance in lengths of the direction (inf = nothing), (N,) face (-1), of rays (N, 3)."""
         ...
 
     def counts(
         self, cameras: Sequence[Camera], face_label: NDArray[np.uint32], n_labels: int
     ) -> NDArray[np.uint32]:
-        """(n_cameras, n_labels) pixels of each label; label 0 also counts misses. face_label: (F,) uint32.
-
-        Pictures need not exist as a whole, so this is the call for scoring thousands of cameras.
-        """
+        """(n_cameras, n_labels) pixels of labels (F,), 0 = misses too, for thousands of cameras."""
         ...
 
 
 def rays_of_pixels(camera: Camera) -> tuple[F32, F32, Mask | None]:
-    """(N, 3) origins and directions of all pixels, and (H, W) the pixels without a ray, if any.
-
-    A pixel without a ray gets one along the axis: a tracer takes no direction of length 0.
-    """
+    """(N, 3) origins and directions of all pixels; (H, W) those without a ray, which get the axis."""
     origin, directions = camera.rays()
     blind = camera.blind
     if blind is not None:

@@ -1,8 +1,4 @@
-"""Choice of a working Mitsuba variant for this machine, and of LLVM's library for it.
-
-Effects: sets DRJIT_LIBLLVM_PATH and Mitsuba's variant of this process, and loads the libraries that
-Dr.Jit and LLVM need if the system has none.
-"""
+"""Choice of a Mitsuba variant and of LLVM's library; sets both for this process and loads dependencies."""
 
 from __future__ import annotations
 
@@ -51,10 +47,7 @@ def import_renderer(name: str) -> Any:
 
 
 def llvm_version(library: Path) -> tuple[int, ...]:
-    """Version of a libLLVM by its real file name (libLLVM.so.19.1, libLLVM-14.0.6.so.1); () unknown.
-
-    Windows' LLVM-C.dll names none and counts as MIN_LLVM.
-    """
+    """Version of a libLLVM by its real file name, () unknown; Windows' LLVM-C.dll is MIN_LLVM."""
     # Resolve links first: libLLVM.so alone names no version.
     name = library.resolve().name
     if name == "LLVM-C.dll":
@@ -64,12 +57,7 @@ def llvm_version(library: Path) -> tuple[int, ...]:
 
 
 def llvm_libraries() -> list[tuple[tuple[int, ...], Path]]:
-    """(version, path) of every libLLVM in the usual places, newest first, one path per file.
-
-    For messages and for choosing: none is loaded. The places of Linux distributions, of Homebrew,
-    of the Python environment and of the user's own packages (pip's --user) are looked into;
-    DRJIT_LIBLLVM_PATH is `find_llvm`'s affair.
-    """
+    """(version, path) of every libLLVM in the usual places, newest first, unloaded."""
     of_python = (sys.prefix, site.getuserbase())
     patterns = (*LIBRARY_PLACES, *(f"{folder}/lib/libLLVM*.so*" for folder in of_python))
     libraries: dict[Path, tuple[int, ...]] = {}
@@ -84,10 +72,7 @@ def llvm_libraries() -> list[tuple[tuple[int, ...], Path]]:
 
 
 def find_llvm() -> Path | None:
-    """The LLVM library for Dr.Jit: DRJIT_LIBLLVM_PATH if new enough, else the newest installed one.
-
-    None without one of version 17 or later.
-    """
+    """Dr.Jit's LLVM, 17 or later: DRJIT_LIBLLVM_PATH, else the newest installed one; or None."""
     # Honour the user's choice unless that library is known to crash.
     named = os.environ.get("DRJIT_LIBLLVM_PATH", "")
     if named and Path(named).exists():
@@ -120,11 +105,7 @@ def name_libraries() -> Path | None:
 
 @functools.cache
 def choose_variant() -> str:
-    """cuda_ad_rgb if a GPU really works, else llvm_ad_rgb with LLVM >= 17, else scalar_rgb.
-
-    Each variant is tried with one ray. Raises MachineFailed when Mitsuba is not installed or no
-    variant works.
-    """
+    """cuda_ad_rgb if a GPU works, else llvm_ad_rgb, else scalar_rgb, each tried; MachineFailed."""
     library = name_libraries()
     dr = import_renderer("drjit")
     # Prefer the GPU, then LLVM, then Mitsuba without Dr.Jit's arrays.
@@ -138,10 +119,7 @@ def choose_variant() -> str:
 
 
 def mitsuba(variant: str | None = None) -> Any:
-    """The mitsuba module with a variant set, `choose_variant` by default; before any use of drjit.
-
-    Raises MachineFailed when the variant cannot be loaded here.
-    """
+    """The mitsuba module with a variant set, before any use of drjit; MachineFailed if it cannot load."""
     name = choose_variant() if variant is None else variant
     module = import_renderer("mitsuba")
     if module.variant() != name:
@@ -170,11 +148,7 @@ def _has_good_llvm(dr: Any) -> bool:
 
 
 def works(variant: str) -> bool:
-    """The variant traces a ray on this machine.
-
-    Costs a compilation for LLVM and CUDA variants. Every failure that a machine without the driver
-    or library may show is False, none is raised.
-    """
+    """The variant traces a ray (a compilation) on this machine; False for every failure."""
     try:
         mi = mitsuba(variant)
         # Aim at the middle of a square 1 m away.

@@ -72,11 +72,7 @@ class GivenCamera(BaseModel):
         return self
 
     def camera(self, width_px: int, height_px: int) -> Camera:
-        """On a grid of that size.
-
-        K is scaled to the size where its own was given; otherwise the field of view counts, with
-        square pixels and the principal point in the middle. The skew of K is not regarded.
-        """
+        """On a grid of that size: K scaled, without skew, else the field of view with square pixels."""
         if self.K is None or self.width_px is None or self.height_px is None:
             intrinsics = Intrinsics.from_hfov(width_px, height_px, self.hfov_rad)
         else:

@@ -57,10 +57,7 @@ def camera_map_rgb(house: House, sampling: Sampling) -> NDArray[np.uint8]:
 
 
 def camera_map(house: House, sampling: Sampling) -> Drawing:
-    """The map of a house's sampling; x of the world to the right, z down.
-
-    For formats other than SVG and pixels. Levels are side by side.
-    """
+    """The map, for SVG and pixels, of a house's sampling, levels side by side, x right, z down."""
     marks, right, bottom = _levels_to_draw(house, sampling.views, sampling.traces)
     # Write the legend and the reasons to the right of the last level.
     notes = _notes(sampling)

@@ -74,10 +74,7 @@ class CameraReport(Record):
 
     @property
     def why_none(self) -> str:
-        """One line that says why no room has a view.
-
-        Only for a report without views. At most three rooms are named.
-        """
+        """One line, naming at most three rooms, that says why no room has a view."""
         if not self.rooms:
             return "; ".join(self.notes) or "the house has no rooms"
         reasons = [
@@ -99,10 +96,7 @@ def total_rejected(rooms: tuple[RoomReport, ...]) -> dict[str, int]:
 
 
 class Verdict(IntEnum):
-    """Outcome of a candidate viewpoint: the first rule that rejected it, or its success.
-
-    The numbers are the order in which rules are tried; maps and reports use the label.
-    """
+    """Outcome of a candidate viewpoint: the number of the first rule that rejects it, or its success."""
 
     OUTSIDE_ROOM = 0  # not inside the room's polygon
     NEAR_OBSTACLE = 1  # closer to a triangle than the clearance

@@ -31,10 +31,7 @@ if TYPE_CHECKING:
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Sampling:
-    """Cameras of a house: its views, the report for cameras.json, every candidate by room.
-
-    The traces are for the camera map alone and are not stored.
-    """
+    """Cameras of a house: its views, the report for cameras.json, every candidate for the map alone."""
 
     views: tuple[View, ...]
     report: CameraReport

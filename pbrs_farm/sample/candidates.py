@@ -19,11 +19,7 @@ from pbrs_farm.core.recipe import CameraFields
 
 @dataclass(frozen=True, slots=True, eq=False)
 class Candidates:
-    """N candidate viewpoints of one room, sector by sector, cells in order of z, then x.
-
-    Arrays rather than cameras: a room has thousands, of which few are looked at; `cameras`
-    makes those.
-    """
+    """N candidate viewpoints of a room as arrays, by sector, then z, then x; `cameras` makes some."""
 
     eye: F64  # (N, 3) metres
     towards: F64  # (N, 3) unit
@@ -36,11 +32,7 @@ class Candidates:
         return len(self.sector)
 
     def cameras(self, which: NDArray[np.intp], intrinsics: Intrinsics) -> list[Camera]:
-        """The candidates with indices which (M,), as cameras; intrinsics: those of zoom 1.
-
-        In the order of which. Each has its own zoom and roll. Cameras are objects: create only those that are
-        needed.
-        """
+        """The candidates which (M,), in that order, as cameras; intrinsics: those of zoom 1."""
         plain = cameras_looking(
             intrinsics, self.eye[which], self.towards[which], roll=self.roll[which]
         )
@@ -59,10 +51,7 @@ def cameras_looking(
     *,
     roll: F64 | None = None,
 ) -> list[Camera]:
-    """Camera.look for many at once: eyes, towards (N, 3), neither parallel to up.
-
-    roll: (N,) radians clockwise about the axis; None = upright.
-    """
+    """Camera.look for many: eyes, towards (N, 3), neither parallel to up; roll: (N,) radians clockwise."""
     # Build OpenGL axes: x right, y up, z back.
     back = -towards / np.linalg.norm(towards, axis=1, keepdims=True)
     right = np.cross(np.array(up), back)
@@ -140,10 +129,7 @@ def n_cells(grid: Grid, cell_m: float) -> tuple[int, int]:
 
 
 def uniforms(key: int, cell: I32, n: int) -> F64:
-    """(len(cell), n) float64 in [0, 1), hashed from key and cell.
-
-    SplitMix64's finalizer (Steele et al. 2014) over key, column, row and the number's index.
-    """
+    """(len(cell), n) in [0, 1) by SplitMix64's finalizer (Steele et al. 2014) over key, cell and number."""
     # Mix key, column and row into one state, then a number per index.
     state = np.full(len(cell), key % 2**64, np.uint64)
     for part in (cell[:, 0], cell[:, 1]):

@@ -35,10 +35,7 @@ class Drawing:
     marks: tuple[Mark, ...]  # later ones on top
 
     def svg(self) -> str:
-        """The drawing as a whole SVG file.
-
-        Write it as UTF-8. Marks are drawn in their order, later ones on top.
-        """
+        """The drawing as a whole SVG file, to be written as UTF-8, later marks on top."""
         box = f"0 0 {self.width} {self.height}"
         root = svg_file(width=self.width, height=self.height, viewBox=box, font_family="sans-serif")
         element(root, "rect", width="100%", height="100%", fill="#ffffff")
@@ -47,10 +44,7 @@ class Drawing:
         return svg_text(root) + "\n"
 
     def rgb(self) -> NDArray[np.uint8]:
-        """(height, width, 3) uint8 sRGB, drawn at twice the size and halved.
-
-        Text is in Pillow's default font and drawn last, on top of all shapes.
-        """
+        """(height, width, 3) uint8 sRGB, drawn at twice the size and halved, text on top."""
         # Paint shapes at twice the size and halve it: edges become smooth.
         big = Image.new("RGB", (2 * self.width, 2 * self.height), "#ffffff")
         pen = ImageDraw.Draw(big)

@@ -1,7 +1,4 @@
-"""Test for impossible eye positions: inside an object, or not above a floor.
-
-No effects: it renders with the item counter it is given.
-"""
+"""Test for eyes inside an object, or not above a floor, by the given item counter; no effects."""
 
 from __future__ import annotations
 
@@ -45,10 +42,7 @@ class EnclosureLimits(NamedTuple):
 def count_items(
     counter: ItemCounter, cameras: Sequence[Camera], n_items: int, *, group: int = 1
 ) -> Iterator[tuple[slice, NDArray[np.uint32]]]:
-    """(which cameras, their rows (n, n_items + 1)) in parts of bounded size.
-
-    group: cameras in a row that stay together. A counter may give fewer columns, not more.
-    """
+    """(which cameras, rows (n, n_items + 1)) in bounded parts; group: cameras in a row that stay together."""
     most = max(1, min(_CAMERAS_PER_CALL, _COUNTS_PER_CALL // (n_items + 1)) // group) * group
     for start in range(0, len(cameras), most):
         part = slice(start, min(start + most, len(cameras)))
@@ -60,10 +54,7 @@ def count_items(
 
 
 def not_above_floor(house: House, eyes: F64, counter: ItemCounter) -> Bools:
-    """(N,) bool: the first surface straight below the eye (N, 3) is a wall or a ceiling.
-
-    Then the eye is above a low or sloped ceiling, above a wall, or inside one.
-    """
+    """(N,) bool: the first surface straight below the eye (N, 3) is a wall or a ceiling."""
     # Look straight down with one pixel.
     pencil = Intrinsics.from_hfov(1, 1, 1e-4)
     down = np.array([0.0, -1.0, 0.0])
@@ -76,10 +67,7 @@ def not_above_floor(house: House, eyes: F64, counter: ItemCounter) -> Bools:
 
 
 def _in_standing_wall(house: House, eyes: F64) -> Bools:
-    """(N,) bool: the eye (N, 3) is in a wall whose bottom is in the floor's plane or above.
-
-    Which of two coplanar faces a ray hits differs between processors, so both are accepted.
-    """
+    """(N,) bool: the eye (N, 3) is in a wall whose bottom is in the floor's plane or above."""
     plan, inside = eyes[:, [0, 2]], np.zeros(len(eyes), np.bool_)
     floors = [s for item in house.items if item.kind is ItemKind.FLOOR for s in item.surfaces]
     floor_y = highest_below(plan, corners_of_surfaces(floors), eyes[:, 1])
@@ -98,11 +86,7 @@ def _in_standing_wall(house: House, eyes: F64) -> Bools:
 def enclosed(
     house: House, eyes: F64, counter: ItemCounter, limits: EnclosureLimits | None = None
 ) -> Bools:
-    """(N,) bool: one item all around the eye (N, 3): a wardrobe's inside, a solid wall's.
-
-    Counts the pixels of the six faces of a cube around the eyes that some item's box holds. limits:
-    of this house, where they are at hand.
-    """
+    """(N,) bool: one item all around the eye (N, 3), by a cube's six pictures; limits: of this house, if known."""
     bounds, most = limits or enclosure_limits(house)
     inside = np.zeros(len(eyes), np.bool_)
     in_box = np.flatnonzero(_held_by(bounds, eyes))

@@ -105,10 +105,7 @@ def _camera_report(
 
 
 def add_rig_views(views: Iterable[View], rig: RigFields | None) -> tuple[View, ...]:
-    """The views of all cameras of a rig at the place and with the intrinsics of each view.
-
-    The first camera's view keeps the id. Without a rig the views are unchanged.
-    """
+    """The views of all cameras of a rig (the first keeps the id) for each view; unchanged without a rig."""
     if rig is None:
         return tuple(views)
     cameras = tuple(zip(rig.eyes, rig.cameras, strict=True))

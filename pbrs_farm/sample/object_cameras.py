@@ -55,10 +55,7 @@ def object_views(
 
 
 def icosphere_vertices(n_subdivisions: int) -> F64:
-    """(10 * 4^n + 2, 3) unit vertices of the icosahedron, each edge halved n times.
-
-    Two of the icosahedron's vertices are the poles (0, 1, 0) and (0, -1, 0).
-    """
+    """(10 * 4^n + 2, 3) unit vertices, both poles among them, of the icosahedron, edges halved n times."""
     vertices, faces = _icosahedron()
     for _ in range(n_subdivisions):
         # Make one middle per edge, on the sphere, and four faces of each.

@@ -56,10 +56,7 @@ _Name = tuple[str, int]
 
 
 def share_distance(shares: F64) -> F64:
-    """(...) L1 distance, 0..2, of NYU13 shares (..., 14) to those of NYUv2's frames.
-
-    shares: means or sums over views, any scale; column 0 is ignored. The maximum if no pixel has a class.
-    """
+    """(...) L1 distance, 0..2 (no class: 2), of NYU13 shares (..., 14), column 0 ignored, to NYUv2's."""
     labelled = shares[..., 1:]
     total = labelled.sum(-1, keepdims=True)
     part = labelled / np.where(total > 0, total, 1.0)
@@ -123,10 +120,7 @@ class PhotoChoice:
     _are_alike: dict[frozenset[_Name], bool] = field(default_factory=dict)
 
     def choose(self, rooms: Sequence[RoomCandidates]) -> dict[tuple[str, int], list[int]]:
-        """(room id, sector) -> indices of the chosen candidates; writes their verdicts.
-
-        Sectors take turns by their best score, so that of two near-duplicates the better one stays.
-        """
+        """(room id, sector) -> chosen indices, best sectors first; writes the verdicts."""
         sectors = self._filled_sectors(rooms)
         for sector in sectors:
             sector.scored.verdict[sector.taken] = Verdict.WINNER

@@ -64,11 +64,7 @@ class PhotoSampler:
     )
 
     def room_candidates(self, room: Room) -> RoomCandidates:
-        """Every candidate of a room, rejected by a rule or scored from a tiny picture.
-
-        Deterministic by seed, house and room. Pictures are traced for what the rules about position
-        leave: this is where the time goes.
-        """
+        """Every candidate of a room, rejected by a rule or, slowly, scored from a tiny picture."""
         f = self.fields
         names = (self.seed, self.house.id, room.id)
         candidates = grid_candidates(room_grid(room), f, names)
@@ -124,10 +120,7 @@ class PhotoSampler:
         return RoomCandidates(placed.room, candidates, verdict, score, nyu13, framing, foreground)
 
     def choose(self, rooms: Sequence[RoomCandidates]) -> dict[tuple[str, int], list[int]]:
-        """(room id, sector) -> indices of the chosen candidates; writes their verdicts.
-
-        rooms: all of the house at once. Sectors without a choice may be missing.
-        """
+        """(room id, sector) -> chosen indices; rooms: every room of the house. Writes the verdicts."""
         lens = self._intrinsics(*DEPTH_SIZE)
         looked_at = dict(self._looked_at)
         choice = PhotoChoice(self.fields, lens, lambda c: self.pictures_of(c)[0], looked_at)
@@ -144,11 +137,7 @@ class PhotoSampler:
         return chosen
 
     def views(self, scored: RoomCandidates, sector: int, chosen: list[int]) -> list[View]:
-        """The chosen candidates of a sector as views, at the scoring size.
-
-        chosen: numbers from `choose`, which counted the pixels of furniture (`objects`) anew at the
-        scoring size.
-        """
+        """The chosen candidates of a sector as views, at the scoring size."""
         columns, per_sector = np.flatnonzero(self._roles.furniture), self.fields.per_sector
         counted = [self._at_full_size[scored.room.id, number] for number in chosen]
         return [
@@ -206,10 +195,7 @@ class PhotoSampler:
 
 
 def sector_report(scored: RoomCandidates, sector: int, views: Sequence[View]) -> SectorReport:
-    """Number of candidates of a sector rejected by each rule, and its view.
-
-    views: of this sector, in order of choice. Call it after `choose`, which writes the verdicts.
-    """
+    """Number of candidates of a sector rejected by each rule, and its views; after `choose`."""
     verdict = scored.verdict[scored.candidates.sector == sector]
     ranked = scored.ranked(sector)
     winners = np.flatnonzero(scored.verdict[ranked] == Verdict.WINNER)

@@ -79,10 +79,7 @@ _SPACINGS: Final = 10  # of the points on an item's surface, along its longest e
 
 @dataclass(frozen=True, slots=True, eq=False)
 class ItemRoles:
-    """Role of each instance id of a house in a photograph; index 0 = nothing.
-
-    furniture, opening, wall, floor, structure: (n_items + 1,) bool. nyu13: (n_items + 1,) int64 class.
-    """
+    """Role in a photograph, and NYU13 class, of each instance id (n_items + 1,); index 0 = nothing."""
 
     furniture: Bools
     opening: Bools
@@ -117,10 +114,7 @@ class PhotoShares:
 
 
 def item_roles(house: House) -> ItemRoles:
-    """Roles by kind and class: openings are no furniture, nor are curtains and built-in parts.
-
-    Arrays are indexed by instance id: entry 0 is nothing, item k of the house has k + 1.
-    """
+    """Roles by kind and class, entry 0 nothing: openings, curtains, built-in parts are no furniture."""
     items = house.items
     return ItemRoles(
         furniture=_flags([_is_furniture(item) for item in items]),
@@ -240,10 +234,7 @@ def _median_depth(depth_m: F32) -> F64:
 
 
 def photo_score(shares: PhotoShares) -> F64:
-    """(N,) score: furniture, items and classes count; doors, close-ups and bare walls cost.
-
-    Shares are of the picture, distances metres. Only differences matter: zero has no meaning.
-    """
+    """(N,) score, by differences: furniture, items, classes count; doors, close-ups, bare walls cost."""
     # Reward typical subjects of photographs, up to a maximum.
     score = np.minimum(shares.furniture, MOST_FURNITURE)
     score += SCORE_OF_OBJECT * np.minimum(shares.n_objects, MOST_OBJECTS)
@@ -269,10 +260,7 @@ def framing_cost(shares: PhotoShares, tilt_deg: F64) -> F64:
 
 
 def foreground_cost(shares: PhotoShares) -> F64:
-    """(N,) total cost of objects close to the lens, by FOREGROUND, and of furniture cut by the edge.
-
-    It is subtracted from a view's score, but rejects no view.
-    """
+    """(N,) cost, which rejects no view, of close objects by FOREGROUND and of cut furniture."""
     nearer = zip(FOREGROUND, shares.foreground.T, strict=True)
     costs = [f.cost * np.maximum(share - f.free, 0) for f, share in nearer]
     costs.append(CUT_COST * np.maximum(shares.cut - CUT_FREE, 0))

@@ -37,10 +37,7 @@ def rejections(
     geometry: Geometry,
     counter: ItemCounter,
 ) -> NDArray[np.uint8]:
-    """(N,) verdict: outside the floor's mask, on an obstacle's projection, or LOWER_SCORE.
-
-    No clearance in three dimensions and no look around: the published sampler had neither.
-    """
+    """(N,) verdict as published: off the floor's mask, on an obstacle's projection, or LOWER_SCORE."""
     verdict = np.full(len(candidates), Verdict.LOWER_SCORE, np.uint8)
     # Read the masks between their nodes, as the published program did.
     top = max((i.bounds[1, 1] for i in _items_of(house, room)), default=room.ceiling_y)

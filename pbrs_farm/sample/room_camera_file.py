@@ -42,10 +42,7 @@ def cameras_from_text(text: str, file: str, width_px: int, height_px: int) -> li
 
 
 def with_names(text: str, names: str, file: str) -> str:
-    """The lines of a room_camera.txt, each followed by its line of room_camera_name.txt.
-
-    Blank lines do not count. Raises BadInput for different numbers of lines.
-    """
+    """Lines of a room_camera.txt, each before its room_camera_name.txt line; BadInput unless as many."""
     lines = [line for line in text.splitlines() if line.strip()]
     named = [line.strip() for line in names.splitlines() if line.strip()]
     if len(lines) != len(named):

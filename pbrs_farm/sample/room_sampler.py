@@ -1,7 +1,4 @@
-"""One room's views: candidates, the rules that reject them, the best of each sector.
-
-No effects: the counter that it is given renders the pictures.
-"""
+"""One room's views: candidates, rules, the best of each sector, by the given counter; no effects."""
 
 from __future__ import annotations
 
@@ -62,10 +59,7 @@ class RoomSampler:
     geometry: Geometry
 
     def explain_rejection(self) -> str:
-        """Why this room is not sampled at all, or "".
-
-        Only a repaired house knows what lights its rooms; before that light is no reason.
-        """
+        """Why this room is not sampled at all (no light, once repaired), or ""."""
         room = self.room
         if self.house.is_repaired and not room.lit_by:
             return "nothing lights it: neither lamp nor window nor sky"
@@ -80,11 +74,7 @@ class RoomSampler:
         return ""
 
     def run(self) -> tuple[list[View], RoomReport, RoomTrace]:
-        """The room's views, its report and all its candidates.
-
-        Deterministic by seed, house and room. A room whose candidates are all rejected gives no
-        view and reasons in its report.
-        """
+        """The room's views, its report (with reasons) and all its candidates."""
         names = (self.seed, self.house.id, self.room.id)
         candidates = grid_candidates(self._grid(), self.fields, names)
         rules = released_rules if self.fields.preset == "released" else paper_rules

@@ -66,10 +66,7 @@ class FullScores:
 
 
 def best_first(coarse: Coarse, full: FullScores, *, margin: float | None) -> int | None:
-    """Number of the candidate with the best full-size score; None if none keeps the rules.
-
-    margin: by how much a coarse score may be too low; None scores every candidate at full size.
-    """
+    """The candidate of the best full-size score, or None; margin: of coarse scores, None = trust none."""
     order = np.argsort(-coarse.score, kind="stable")
     if margin is None:
         full.rescore_new(order)

@@ -23,10 +23,7 @@ OUTSIDE = "out"  # room id in the views of cameras outside all rooms
 def stored_views(
     house: House, fields: CameraFields, counter: ItemCounter
 ) -> tuple[tuple[View, ...], tuple[str, ...]]:
-    """The cameras in the house's source as views, and notes on omitted ones.
-
-    They keep their own field of view, and no rule is applied. Raises nothing.
-    """
+    """The source's cameras as views, with their field of view and no rule, and notes on omitted ones."""
     cameras, notes = [], []
     for stored in house.cameras:
         # Skip poses with non-finite numbers, no direction, or too wide a field of view.
@@ -79,11 +76,7 @@ def views_from_cameras(
 
 
 def room_of(house: House, camera: Camera) -> Room | None:
-    """The room whose polygon holds the eye and whose floor is the nearest below it, or None.
-
-    Rooms over each other: the upper one's floor decides. An eye more than half a metre above the
-    ceiling is in no room.
-    """
+    """The room around the eye with the nearest floor below, up to half a metre above its ceiling; or None."""
     x, y, z = camera.eye
     # Allow for a floor drawn a little high and an eye just above the ceiling.
     holding = [

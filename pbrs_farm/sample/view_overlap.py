@@ -1,7 +1,4 @@
-"""Overlap of two views, by reprojection of one's pixels into the other; no effects.
-
-Pictures of 32 x 24 pixels suffice: near-duplicates differ by far less than the threshold.
-"""
+"""Overlap of two views, by reprojection of one's (32 x 24) pixels into the other; no effects."""
 
 from __future__ import annotations
 
@@ -26,10 +23,7 @@ ItemPictures = Callable[[Sequence[Camera]], tuple[F32, NDArray[np.uint32]]]
 
 
 def shared_part(a: Camera, depth_a: F32, b: Camera, depth_b: F32) -> float:
-    """The part of a's pixels with a surface that b sees too; 0 where a sees nothing.
-
-    depth_a, depth_b: (H, W) planar depth in metres of the cameras' own pictures, 0 = nothing.
-    """
+    """Part of a's pixels with a surface that b sees too, or 0; depth: (H, W) planar metres, 0 = nothing."""
     # Lift a's pixels to points of the world.
     origin, directions = a.rays()
     points = (origin + directions * depth_a[..., None])[depth_a > 0]

@@ -1,7 +1,4 @@
-"""From pixels per item to a view's score: which items count, and how (paper section 3.1).
-
-No effects.
-"""
+"""From pixels per item to a view's score: which items count, and how (paper section 3.1); no effects."""
 
 from __future__ import annotations
 
@@ -30,10 +27,7 @@ def object_columns(house: House) -> NDArray[np.intp]:
 
 
 def released_columns(house: House, room: Room) -> NDArray[np.intp]:
-    """Instance ids the published sampler counts in a room (docs/spec/suncg.md section 3.2 d).
-
-    Objects of this room alone; stairs, columns and boxes are no objects there.
-    """
+    """Instance ids that the published sampler counts: this room's but stairs, columns and boxes."""
     # An item's instance id is its place in the list plus 1; 0 is nothing.
     ids = [
         i + 1
@@ -57,11 +51,7 @@ def paper_score(
 
 
 def overfill(counts: NDArray[np.uint32], columns: NDArray[np.intp], fields: CameraFields) -> F64:
-    """(N,) by how much of the picture one item covers more than it may; above 0 rejects the view.
-
-    An object may cover max_item_fraction, a wall (floor, ceiling) max_wall_fraction. counts:
-    (N, n_items + 1) pixels. Beyond the paper; 1 switches a rule off.
-    """
+    """(N,) excess, above 0 rejects, of an item's share of counts over max_item_ or max_wall_fraction."""
     # Compare the largest object and the largest wall with what each may cover.
     pixels = np.maximum(counts.sum(1, dtype=np.int64), 1)
     structure = np.delete(

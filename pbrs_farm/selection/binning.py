@@ -1,8 +1,4 @@
-"""Choice of the binning for a reference set, by leave-one-out tests of five binnings; no effects.
-
-Merging bins can only raise an intersection, so the finest binning that passes is well defined:
-every coarser one passes too.
-"""
+"""Choice of a reference's binning by leave-one-out tests, from fine to coarse, of five; no effects."""
 
 from __future__ import annotations
 
@@ -57,10 +53,7 @@ class BinningRow(Record):
 def binning_table(
     colour: NDArray[np.integer], depth: NDArray[np.integer], *, min_colour: float, min_depth: float
 ) -> tuple[BinningRow, ...]:
-    """A row for each of BINNINGS that the counts colour (n, bins) and depth (n, bins) can be reduced to.
-
-    Raises ValueError for fewer than two images.
-    """
+    """A row for each of BINNINGS that counts (n, bins) can be reduced to; ValueError below two images."""
     if len(colour) < 2:
         raise ValueError("a reference needs two images at least: each is compared with the others")
     rows = []
@@ -86,10 +79,7 @@ def binning_table(
 
 
 def finest_passing(rows: Sequence[BinningRow]) -> Binning:
-    """The finest colour bins and, separately, the finest depth bins that enough images pass.
-
-    The coarsest if none passes.
-    """
+    """The finest (or coarsest) colour bins and, separately, depth bins that enough images pass."""
     # Rows run from coarse to fine, so the last that passes is the finest.
     colour = [r.binning.colour for r in rows if r.colour_passing >= MIN_PASSING]
     depth = [r.binning.depth for r in rows if r.depth_passing >= MIN_PASSING]
@@ -101,11 +91,7 @@ def finest_passing(rows: Sequence[BinningRow]) -> Binning:
 
 
 def table_text(rows: Sequence[BinningRow], chosen: Binning) -> str:
-    """The table as text: "*" marks the chosen colour and depth bins.
-
-    rows go from the coarsest binning to finer ones. If too few photographs pass even the coarsest, it
-    is used anyway and a line says so.
-    """
+    """The table, coarsest first, as text, "*" at the chosen bins, with a line if even these fail."""
     lines = ["colour bins      pass  median    depth bins  pass  median"]
     for r in rows:
         c = "*" if r.binning.colour == chosen.colour else " "

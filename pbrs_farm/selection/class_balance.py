@@ -16,11 +16,7 @@ _FLOOR: Final = 0.01  # of a picture: bounds the gain of the first view of a cla
 
 
 def class_shares(texts: Sequence[str]) -> F32:
-    """(n, 41) share of the picture of each NYU40 class, from "1:0.53 2:0.21" texts.
-
-    Column k is class k; 0 is unknown. A text may be empty; missing classes have share 0. Raises
-    ValueError or IndexError for a malformed text: texts come from tables of this package.
-    """
+    """(n, 41) share of each NYU40 class (0 unknown), from "1:0.53 2:0.21" texts of our tables."""
     shares = np.zeros((len(texts), N_CLASSES), np.float32)
     for row, text in enumerate(texts):
         for pair in text.split():

@@ -61,11 +61,7 @@ def pack_house(
     failed: dict[str, str] | None = None,
     score_mode: Mode = SCORED_MODE,
 ) -> HistogramPack:
-    """The pack of a house's records, by view id.
-
-    failed: view id -> reason why it cannot be read; such views are kept and marked. A view without
-    SCORED_MODE is scored at score_mode, else "unscored". Raises ValueError for a record of other settings.
-    """
+    """The pack of a house's records and failures (id -> reason); ValueError for other settings."""
     rows = sorted(records, key=lambda r: r.view)
     if any(r.settings != settings for r in rows):
         raise ValueError("records of different settings cannot be packed together")
@@ -117,11 +113,7 @@ def _mode(record: ViewRecord, score_mode: Mode) -> Mode | None:
 
 
 def bytes_from_pack(pack: HistogramPack) -> bytes:
-    """The pack as one object; equal packs give equal bytes.
-
-    A line of JSON with the settings, house, source and ids, then the three tables of numbers,
-    compressed. `pack_from_bytes` reads it back.
-    """
+    """The pack as one object: a line of JSON, three compressed tables; equal for equal packs."""
     head: dict[str, Any] = {"format": _FORMAT, "settings": pack.settings.model_dump(mode="json")}
     head |= {name: getattr(pack, name) for name in ("house", "source", *_TEXTS)}
     body = b"".join(
@@ -168,11 +160,7 @@ def pack_from_bytes(data: bytes, name: str) -> HistogramPack:
 
 
 def pack_source(data: bytes) -> str:
-    """The `source` of a pack's object, to check if the pack is up to date; "" without one.
-
-    Reads the first line only, without decompressing the numbers. A damaged object gives "", which
-    equals no source, so the pack is rebuilt.
-    """
+    """The `source`, on its first line, of a pack's object; "" if damaged, so that it is rebuilt."""
     try:
         return str(json.loads(data.partition(b"\n")[0])["source"])
     except (ValueError, KeyError, TypeError):

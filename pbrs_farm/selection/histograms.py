@@ -28,10 +28,7 @@ class Histogram:
 def histogram(
     rgb_srgb8: Srgb8Image, depth_mm: NDArray[np.integer], settings: HistogramFields
 ) -> Histogram:
-    """Histogram of a picture (H, W, 3) uint8 and its depth (H, W) in mm, 0 = unknown.
-
-    Paper section 3.3. The two may differ in size. Raises ValueError for other shapes.
-    """
+    """Histogram (paper section 3.3) of (H, W, 3) uint8 and depth in mm, maybe of another size; ValueError."""
     return Histogram(colour_counts(rgb_srgb8, settings), depth_counts(depth_mm, settings))
 
 
@@ -83,10 +80,7 @@ def _ycbcr(rgb: Srgb8Image) -> Srgb8Image:
 
 
 def coarser_colour(counts: NDArray[np.generic], shape: tuple[int, int, int]) -> NDArray[np.generic]:
-    """(..., a * b * c) sums of a cube of colour bins (..., n ** 3) at shape = (a, b, c) bins.
-
-    Raises ValueError if a, b or c does not divide n.
-    """
+    """(..., a * b * c) sums of colour bins (..., n ** 3); ValueError unless a, b, c divide n."""
     n = round(counts.shape[-1] ** (1 / 3))
     if n**3 != counts.shape[-1] or any(n % k for k in shape):
         raise ValueError(f"{counts.shape[-1]} colour bins cannot be summed to {shape}")
@@ -99,11 +93,7 @@ def coarser_colour(counts: NDArray[np.generic], shape: tuple[int, int, int]) -> 
 
 
 def coarser_depth(counts: NDArray[np.generic], n_bins: int) -> NDArray[np.generic]:
-    """(..., n_bins) sums of neighbouring depth bins of counts (..., bins).
-
-    Exact: equals a histogram counted at the coarser bins. Raises ValueError if n_bins does not divide
-    the number of bins.
-    """
+    """(..., n_bins) exact sums of depth bins (..., bins); ValueError unless n_bins divides them."""
     if counts.shape[-1] % n_bins:
         raise ValueError(f"{counts.shape[-1]} depth bins cannot be summed to {n_bins}")
     if n_bins == counts.shape[-1]:
@@ -113,10 +103,7 @@ def coarser_depth(counts: NDArray[np.generic], n_bins: int) -> NDArray[np.generi
 
 
 def normalised(counts: NDArray[np.generic]) -> F32:
-    """(..., bins) float32 shares of counts, with sum 1 over the last axis.
-
-    All zero if nothing was counted, so that an empty histogram resembles no other.
-    """
+    """(..., bins) float32 shares of counts, of sum 1, or 0 without any, over the last axis."""
     total = counts.sum(axis=-1, keepdims=True, dtype=np.float64)
     total[total == 0] = 1.0  # nothing counted: shares of 0
     return np.asarray(np.divide(counts, total, dtype=np.float32, casting="same_kind"))

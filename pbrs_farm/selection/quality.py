@@ -29,12 +29,7 @@ ViewPlace = Mapping[Literal["house", "view", "room", "room_type"], str]
 
 
 def picture_quality(rgb_srgb8: Srgb8Image) -> PictureQuality:
-    """Brightness and saturation of (H, W, 3) uint8.
-
-    Brightness is the median luma of every second pixel in each direction, 0..1, from sRGB-encoded
-    values; blown is the share of all pixels whose brightest channel is saturated. For pictures as
-    developed, not for radiance.
-    """
+    """Median luma and saturation, 0..1, and blown share, of a developed (H, W, 3) uint8."""
     # Every second pixel is enough for a median, and fast.
     r, g, b = (rgb_srgb8[::2, ::2, k].astype(np.uint32) for k in range(3))
     # Find the median by counting, with BT.709 weights in 1/256.
@@ -53,10 +48,7 @@ def scene_quality(
     noise: float | None = None,
     missing_textures: int = 0,
 ) -> SceneQuality:
-    """Quality numbers of a view, from its depth (H, W) in mm and the rows "instances" of its view.json.
-
-    Reads "kind" (house.ItemKind), "fraction" and, if present, "nyu40" of a row.
-    """
+    """Quality by depth (H, W) in mm and view.json's "instances" (kind, fraction, nyu40 if any)."""
     # Sum the shares of each class; keep those of each item by its kind.
     classes: dict[int, float] = {}
     rows = []  # (kind, share of the picture)
@@ -84,11 +76,7 @@ def view_record(
     scene: SceneQuality,
     settings: HistogramFields,
 ) -> ViewRecord:
-    """The record of a view from its pictures by mode, (H, W, 3) uint8, and depth (H, W) in mm.
-
-    Colour is counted in the mode of the selection if it has a picture, else in all
-    modes; brightness in all. depth_mm as of `depth_counts`. A colour score needs at least one picture.
-    """
+    """The record of a view: colour in the selection's mode (else all), brightness in all, depth."""
     modes = [SCORED_MODE] if SCORED_MODE in pictures else sorted(pictures)
     return ViewRecord(
         settings=settings,

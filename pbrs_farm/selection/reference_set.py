@@ -1,7 +1,4 @@
-"""The reference photographs of a selection, as histograms: a small file that can be shared.
-
-No effects: bytes in, bytes out. The file is an .npz whose bytes depend on its content alone.
-"""
+"""The reference photographs of a selection as histograms: a small .npz by content alone; no effects."""
 
 from __future__ import annotations
 
@@ -61,27 +58,16 @@ class Reference:
 
     @property
     def digest(self) -> str:
-        """Digest of everything a score depends on.
-
-        Excludes the table of tested binnings, which explains the choice and changes no score. Scores of
-        views are up to date as long as this and the views' histograms are unchanged.
-        """
+        """Digest of everything that a score depends on, so not of the table of tested binnings."""
         facts = self.facts.model_dump(mode="json", exclude={"table"})
         return keys.digest(facts, keys.sha256(self.colour.tobytes() + self.depth.tobytes()))
 
     def colour_shares(self) -> Shares:
-        """(n, bins) normalised colour histograms at the chosen binning.
-
-        A row per photograph, with sum 1. Computed at each call from the fine counts.
-        """
+        """(n, bins) normalised colour histograms at the chosen binning, computed each time."""
         return normalised(coarser_colour(self.colour, self.facts.binning.colour))
 
     def depth_shares(self) -> Shares:
-        """(n, bins) normalised depth histograms at the chosen binning.
-
-        A row per photograph, from pixels of known depth only. Computed at each call from the fine
-        counts.
-        """
+        """(n, bins) normalised histograms of known depth at the chosen binning, computed each time."""
         return normalised(coarser_depth(self.depth, self.facts.binning.depth))
 
 
@@ -123,10 +109,7 @@ def reference_from_histograms(
 
 
 def bytes_from_reference(reference: Reference) -> bytes:
-    """The reference file: a zip of .npy and JSON; equal references give equal bytes.
-
-    Read by reference_from_bytes. It contains no times and no paths of the machine that made it.
-    """
+    """The reference file, a zip of .npy and JSON, without times or paths."""
     file = io.BytesIO()
     with zipfile.ZipFile(file, "w") as archive:
         _add(archive, "reference.json", reference.facts.model_dump_json(indent=1).encode() + b"\n")
@@ -144,11 +127,7 @@ def _add(archive: zipfile.ZipFile, name: str, data: bytes) -> None:
 
 
 def reference_from_bytes(data: bytes, name: str) -> Reference:
-    """The Reference of a file; raises BadInput naming it if it is damaged or of another version.
-
-    A zip archive with reference.json, colour.npy and depth.npy. BadInput also if the tables do not
-    have a row per photograph and the bins of the settings, or there is no photograph.
-    """
+    """The Reference of a file, its tables as long as its settings say; BadInput names it."""
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
             text, hint = archive.read("reference.json"), "build the reference again"
@@ -173,10 +152,7 @@ def _counts_array(data: bytes) -> Counts:
 
 
 def check_comparable(reference: Reference, settings: HistogramFields, name: str) -> None:
-    """Raise BadInput, naming the reference file, unless histograms of settings can be compared.
-
-    Colour space and depth range must be equal; the bins may be finer than the reference compares.
-    """
+    """Raise BadInput, naming the file, unless colour space and depth range equal the settings'."""
     facts = reference.facts
     # Collect all differences for one message.
     differing = [
@@ -196,19 +172,12 @@ def check_comparable(reference: Reference, settings: HistogramFields, name: str)
 
 
 def sun_rgbd_depth(stored: NDArray[np.uint16]) -> NDArray[np.uint16]:
-    """Depth in mm from SUN RGB-D's files, whose 16 bits are rotated left by 3 (its toolbox).
-
-    Not for files of other datasets, nor for SUN RGB-D files already converted by its toolbox. 0
-    stays 0, unknown.
-    """
+    """Depth in mm, 0 unknown, from SUN RGB-D's raw files, whose 16 bits are rotated left by 3."""
     return (stored >> np.uint16(3)) | (stored << np.uint16(13))
 
 
 def depth_mm_from_units(depth: NDArray[Any], units_per_m: float) -> NDArray[np.uint16]:
-    """Convert depth in units_per_m to (H, W) uint16 mm, 0 = unknown; 65.535 m and beyond is 65535.
-
-    Zero and below is unknown. Raises ValueError for NaN and infinity.
-    """
+    """(H, W) uint16 mm, 0 = unknown (zero and below), 65535 the most; ValueError for NaN and infinity."""
     if np.issubdtype(depth.dtype, np.floating) and not np.isfinite(depth).all():
         raise ValueError(f"{int((~np.isfinite(depth)).sum())} pixels of depth are not finite")
     mm = np.rint(np.asarray(depth, np.float64) * (1000.0 / units_per_m))
@@ -216,11 +185,7 @@ def depth_mm_from_units(depth: NDArray[Any], units_per_m: float) -> NDArray[np.u
 
 
 def registration_border(rgb_srgb8: Srgb8Image) -> tuple[slice, slice]:
-    """Rows and columns of a registered photograph inside its border.
-
-    Warping colour onto the depth camera leaves white (NYUv2) or black edges. A row or column is
-    removed while 97 % of it is border; at most an eighth of the picture at each side.
-    """
+    """Rows and columns inside the white or black border (97 %, an eighth at most) of a warped photo."""
     # Mark the pixels that may be border.
     light, dark = (rgb_srgb8 >= WHITE).all(axis=2), (rgb_srgb8 <= BLACK).all(axis=2)
     plain = np.asarray(light | dark)

@@ -53,10 +53,7 @@ class Scorer:
         self._library = library
 
     def score(self, packs: Sequence[HistogramPack]) -> Any:
-        """The score table of the packs' views (SCORES).
-
-        Raises BadInput if the reference cannot be compared at the packs' settings.
-        """
+        """The score table of the packs' views (SCORES); BadInput if incomparable with the reference."""
         packs = [p for p in packs if p.views]
         if not packs:
             return SCORES.empty_table()
@@ -95,12 +92,7 @@ class Scorer:
     def score_all(
         self, packs: Iterable[HistogramPack], batch_views: int = BATCH_VIEWS
     ) -> Iterator[Any]:
-        """Score tables of a stream of packs, about batch_views rows each.
-
-        Packs are not split, so a batch may be larger by most of a pack; the last may be smaller.
-        Lazy: packs are read on demand, so memory does not grow with the root. Without packs it yields
-        nothing.
-        """
+        """Score tables, about batch_views rows each, of a stream of whole packs, read on demand."""
         # Gather packs until they fill a batch.
         batch: list[HistogramPack] = []
         n = 0  # their views
@@ -116,10 +108,7 @@ class Scorer:
     def _best(
         self, counts: Sequence[NDArray[np.generic]], references: F32, packs: Sequence[HistogramPack]
     ) -> tuple[F64, NDArray[Any]]:
-        """(n,) scores, NaN if not scored, and (n,) reference ids, None there.
-
-        counts: of the packs with a scored view; n counts the views of all packs.
-        """
+        """(n,) scores, NaN if not scored, and (n,) reference ids or None, of all packs' views."""
         # Search for scored views only, of the packs that counts holds.
         scored = np.array([bool(m) for p in packs for m in p.modes])
         score = np.full(len(scored), np.nan)
@@ -145,11 +134,7 @@ def score(
 
 
 def merge_tables(*tables: Any) -> Any:
-    """Merge score tables, sorted by house and view; a row in two of them is kept once.
-
-    Associative, commutative, and merging a table with itself gives that table. Raises ValueError
-    if two tables disagree on a view.
-    """
+    """Merge score tables, by house and view, equal rows once; ValueError if two disagree."""
     joined = pa.concat_tables([SCORES.empty_table(), *(t.select(SCORES.names) for t in tables)])
     joined = joined.sort_by([("house", "ascending"), ("view", "ascending")]).combine_chunks()
     if joined.num_rows < 2:

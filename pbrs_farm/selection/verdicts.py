@@ -108,10 +108,7 @@ def _floats(scores: Any, name: str) -> F64:
 
 
 def _beyond_cap(scores: Any, is_kept: Bools, cap: int) -> Bools:
-    """(n,) bool: kept views of a room that already has cap better ones (0 = no limit).
-
-    Better: the smaller of the two scores is larger; then the smaller view id.
-    """
+    """(n,) bool: kept views of a room that has cap better ones (by the lesser score, then id); 0 = no cap."""
     beyond = np.zeros(len(is_kept), bool)
     if cap <= 0 or not is_kept.any():
         return beyond

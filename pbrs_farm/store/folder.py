@@ -121,10 +121,7 @@ class FolderStore:
             raise self.failure(key, error) from error
 
     def sweep(self, older_than_s: float = 24 * 3600.0) -> int:
-        """Remove files of killed writers older than older_than_s; returns their number.
-
-        Unfinished files of live writers are younger than a day.
-        """
+        """Remove files of killed writers older than older_than_s (a day or more); their number."""
         n_removed = 0
         oldest = time.time() - older_than_s  # younger ones may be in use
         for path in (self.root / TEMPORARY).glob("*"):

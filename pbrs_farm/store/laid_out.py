@@ -78,10 +78,7 @@ class _Task:
 
 
 class LaidOutStore:
-    """A remote store that reads either layout, and can pack new output roots.
-
-    packs: True to pack new roots. A root keeps its first layout.
-    """
+    """A remote store that reads either layout; packs: True to pack new roots."""
 
     def __init__(self, inner: Store, packs: bool = True) -> None:
         self.inner = inner
@@ -532,11 +529,7 @@ def _is_packed(data: bytes) -> bool:
 
 @contextmanager
 def one_task(store: Store, *, reads_whole: bool) -> Iterator[Store]:
-    """The store for the duration of one task, whose writes are packed together (LaidOutStore.task).
-
-    reads_whole: the task needs labels and pictures of its view, so packs are fetched whole. Any other kind of
-    store is yielded unchanged.
-    """
+    """The store for one task, whose writes are packed (LaidOutStore.task); reads_whole: fetch whole packs."""
     if not isinstance(store, LaidOutStore):
         yield store
         return

@@ -34,11 +34,7 @@ class Pack:
     head: bytes
 
     def held(self, name: str) -> bytes | None:
-        """The bytes of a member, None if it extends beyond the bytes in `head`.
-
-        name: from `marker_of`, or a file's name below the view's folder; KeyError for one not in `rows`. If None,
-        read the range of `rows` from the pack's object.
-        """
+        """The bytes of a member of `rows` (or KeyError); None if beyond `head`: read its range of the object."""
         _step, start, n_bytes = self.rows[name]
         end = start + n_bytes
         return self.head[start:end] if end <= len(self.head) else None
@@ -119,10 +115,7 @@ def pack_key(house: str, view: str, group: str) -> str:
 
 
 def object_key(key: str) -> str:
-    """The object of a key outside views; `key_of_object` is the inverse.
-
-    The folders of houses and objects are spread as by `house_folder`; other keys (jobs, reports) are unchanged.
-    """
+    """The object of a key outside views, houses spread by `house_folder`; inverse: `key_of_object`."""
     top, _, rest = key.partition("/")
     house, slash, below = rest.partition("/")
     return f"{house_folder(house)}{below}" if top in keys.FOLDERS and slash else key
@@ -138,11 +131,7 @@ def file_or_marker(at: keys.HouseKey) -> str:
 
 
 def groups_of(at: keys.HouseKey) -> tuple[str, ...]:
-    """The groups that may contain a view's file or marker, the likeliest first.
-
-    at: of a file or marker of a view, as `keys` parses it. A marker has one group; a file that
-    plugins may have named has three.
-    """
+    """The groups that may contain a view's file or marker, the likeliest first."""
     if at.step:
         return (GROUP_OF_STEP.get(at.step, at.step),)
     if at.file == "radiance.exr":

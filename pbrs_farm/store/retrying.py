@@ -23,10 +23,7 @@ def retry(
     max_pause_s: float = 8.0,
     on_wait: Callable[[str], None] = lambda _reason: None,
 ) -> T:
-    """Repeat call(number of earlier tries) while it raises StoreUnavailable, for timeout_s.
-
-    Pauses grow exponentially to max_pause_s, each times a random factor of the range jitter.
-    """
+    """Repeat call(number of earlier tries) while StoreUnavailable, for timeout_s, pauses growing with jitter."""
     # Try until success, another error, or a pause that would end after the deadline.
     deadline, n_tries = time.monotonic() + timeout_s, 0
     while True:
@@ -42,11 +39,7 @@ def retry(
 
 
 class RetryingStore:
-    """A store that retries each call while the inner store is unavailable.
-
-    So a finished picture survives an outage in memory and is not rendered again. After timeout_s
-    StoreUnavailable is raised. on_wait: called with the reason before each pause.
-    """
+    """Retries each call for timeout_s while the inner store is unavailable; on_wait: called before a pause."""
 
     def __init__(
         self, store: Store, timeout_s: float, on_wait: Callable[[str], None] = lambda _reason: None

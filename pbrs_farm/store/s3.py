@@ -68,11 +68,7 @@ _conditional: set[tuple[str, str]] = set()  # endpoint and bucket of proven cond
 
 
 def forbid_in_this_process() -> None:
-    """Make every further S3 call of this process raise; its children may call.
-
-    For a process that will fork: the client's threads do not survive a fork. It cannot be undone, but
-    applies to this process id alone, so forked children are not affected.
-    """
+    """Make every further S3 call of this process, which will fork, raise; children may call."""
     _guard.forbidden_pid = os.getpid()
 
 

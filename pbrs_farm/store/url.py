@@ -33,10 +33,7 @@ class StoreSettings:
 
 
 def store_from_url(url: str, settings: StoreSettings | None = None) -> Store:
-    """The store at `file:///folder`, `s3://bucket/prefix`, `memory:` or a plain folder.
-
-    Raises BadInput for any other URL, MachineFailed when the s3 extra is not installed.
-    """
+    """The store at `file:///`, `s3://`, `memory:` or a folder; BadInput, MachineFailed without s3."""
     settings = settings or StoreSettings()
     parts = urlsplit(url)
     if url == "memory:":

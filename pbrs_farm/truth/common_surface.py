@@ -31,11 +31,7 @@ class ViewPairRow:
 
 
 def pair_rows(views: Sequence[View], first_hit: FirstHit) -> list[ViewPairRow]:
-    """A row for each pair of views of a room, rooms and views in the order given.
-
-    views of other rooms are never paired. first_hit: casts rays in the whole house. Time grows with
-    the square of the views of a room.
-    """
+    """A row for each pair of views of a room, in order; time grows with the square of its views."""
     rooms: dict[str, list[View]] = {}
     for view in views:
         rooms.setdefault(view.room_id, []).append(view)
@@ -50,10 +46,7 @@ def pair_rows(views: Sequence[View], first_hit: FirstHit) -> list[ViewPairRow]:
 
 
 def shared_surface(views: Sequence[View], first_hit: FirstHit) -> F64:
-    """(N, N) share of the surface points of view a visible in view b; 0 if a shows nothing.
-
-    A point is visible if it is inside b's picture and a ray from b's eye reaches it.
-    """
+    """(N, N) share of the surface points of view a visible, by a ray, in view b; 0 if a shows nothing."""
     shares = np.eye(len(views))
     small = [view.camera.with_size(*POINTS_SIZE) for view in views]
     for a, camera in enumerate(small):

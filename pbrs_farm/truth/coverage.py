@@ -23,10 +23,7 @@ _CHUNK_PIXELS = 500_000  # and pixels of surfaces with holes
 
 
 def coverage(item: Item, camera: Camera, cut_outs: CutOuts | None = None) -> Mask:
-    """(H, W) bool: the ray through the pixel's centre hits a triangle of item outside of holes.
-
-    Exact for a pinhole; other lenses are approximated by finer pinhole pictures.
-    """
+    """(H, W) bool: item's pixels alone, holes excluded; exact for a pinhole, by finer ones for other lenses."""
     holes = cut_outs or {}
     if camera.intrinsics.lens.is_pinhole:
         return _pinhole_coverage(item, camera, holes)

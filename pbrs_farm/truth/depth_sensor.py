@@ -26,11 +26,7 @@ MAX_ANGLE_RAD = np.radians(82)  # from the normal; beyond it nothing returns, Ng
 
 
 def sensor_depth(hit: HitRecord, camera: Camera, *, seed: int) -> NDArray[np.uint16]:
-    """(H, W) uint16 depth_z in mm as the sensor measures it, 0 = no measurement.
-
-    Equal seeds give equal noise. Not modelled: interreflection, sunlight, glass and mirrors
-    (they measure as their surface), temperature drift.
-    """
+    """(H, W) uint16 measured mm, 0 = none, noise by seed; without interreflection, sun, glass, drift."""
     # Read the depth of a pixel nearby where projector and camera both see the surface.
     rng = np.random.default_rng(seed)
     reached = hit.valid & ~_grazing(hit, camera) & ~_in_projector_shadow(hit.depth_z, camera)

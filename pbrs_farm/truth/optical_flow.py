@@ -54,11 +54,7 @@ def correspondence(
     first_hit: FirstHit,
     then: OtherTime | None = None,
 ) -> Correspondence:
-    """The surface points of a hit record, looked for in another camera's picture.
-
-    The hit record is camera's own. then: the home when the other camera looks; None where nothing
-    has moved, and first_hit is of both. Points behind the other camera count as outside.
-    """
+    """The surface points of a camera's hit record in the other picture; then: the home then, if moved."""
     shape = hit.face.shape
     pixels = np.flatnonzero(hit.face.ravel() >= 0)
     points = points_of_pixels(hit, camera, pixels)
@@ -103,10 +99,7 @@ def _move_points(points: F64, faces: I32, then: OtherTime) -> None:
 
 
 def scene_flow_label(hit: HitRecord, camera: Camera, then: OtherTime | None) -> F32:
-    """(H, W, 3) metres, world axes: motion of each pixel's surface point until the other time.
-
-    0 for static surfaces and for pixels without a hit. Its later position is the layer position plus this.
-    """
+    """(H, W, 3) metres, world axes: motion of each pixel's surface point until the other time, or 0."""
     moved = np.zeros((hit.face.size, 3))
     if then is not None:
         faces = hit.face.ravel()
@@ -119,10 +112,7 @@ def scene_flow_label(hit: HitRecord, camera: Camera, then: OtherTime | None) -> 
 
 
 def project_points(points: F64, camera: Camera) -> tuple[F64, F64]:
-    """(N, 2) px of world points (N, 3), x right and y down, and (N,) their depth_z.
-
-    Through another lens than a pin-hole's a point that it does not see has px NaN and depth 0.
-    """
+    """(N, 2) px, x right, y down, of world points, (N,) depth_z; NaN and 0 where a lens does not see them."""
     if not camera.intrinsics.lens.is_pinhole:
         px = camera.pixels_of(points)
         return px, np.where(np.isfinite(px).all(1), camera.depths_of(points), 0.0)
@@ -147,11 +137,7 @@ def inside_picture(px: F64, z: F64, camera: Camera) -> Bools:
 
 
 def reaches(points: F64, faces: I32, camera: Camera, first_hit: FirstHit) -> Bools:
-    """(N,) true if a ray from the camera reaches each point, or hits the point's own face.
-
-    points: (N, 3) world, metres; faces: (N,) the face of each, so that a grazing ray which hits that face
-    counts. Tolerates the rounding of float32 rays.
-    """
+    """(N,) true if a ray from the camera reaches each point (N, 3), to rounding, or hits its own face (N,)."""
     if not len(points):
         return np.zeros(0, bool)
     to = points - camera.eye
@@ -167,10 +153,7 @@ def flow_label(matches: Correspondence) -> F32:
 
 
 def flow_kitti(matches: Correspondence) -> NDArray[np.uint16]:
-    """(H, W, 3) uint16 as KITTI stores flow: 64 x + 2**15, 64 y + 2**15, 1 = seen in the other picture.
-
-    0, 0, 0 if it is not, and for a motion of 512 pixels or more, for which the format has no number.
-    """
+    """(H, W, 3) uint16 of KITTI's flow: 64 x + 2**15, 64 y + 2**15, 1 if seen; 0 also beyond 512 px."""
     steps = np.rint(matches.flow * KITTI_FLOW_STEP) + 2**15
     valid = (matches.state == SEEN) & ((steps >= 0) & (steps <= 65535)).all(-1)
     steps = np.where(valid[..., None], np.clip(steps, 0, 65535), 0)
@@ -178,20 +161,14 @@ def flow_kitti(matches: Correspondence) -> NDArray[np.uint16]:
 
 
 def disparity_label(matches: Correspondence) -> NDArray[np.uint16]:
-    """(H, W) uint16 as KITTI stores disparity: 256 times the pixels by which rows are shifted.
-
-    1..65535 for a surface, hidden in the other picture or not; 0 = nothing.
-    """
+    """(H, W) uint16 of KITTI's disparity: 256 times the shift in pixels, seen or hidden; 0 = nothing."""
     shift = np.abs(matches.flow[..., 0])
     steps = np.clip(np.rint(shift * KITTI_DISPARITY_STEP), 1, 65535)
     return np.where(matches.in_front, steps, 0).astype(np.uint16)
 
 
 def partners_of(view: View, views: Mapping[str, View]) -> dict[Relation, View]:
-    """Partners of a view among the views of its house (id -> view): "stereo", "next" and "previous".
-
-    A view outside rigs and sequences has none. Each camera of a rig has its own neighbours.
-    """
+    """Partners of a view in its house: "stereo", "next" and "previous", if it has a rig or a sequence."""
     partners: dict[Relation, View] = {}
     stereo = _rectified_partner(view, views)
     if stereo is not None:
@@ -207,10 +184,7 @@ def partners_of(view: View, views: Mapping[str, View]) -> dict[Relation, View]:
 
 
 def _rectified_partner(view: View, views: Mapping[str, View]) -> View | None:
-    """The nearest view of the same instant with the same rows: a rig's stereo pair; None without one.
-
-    It has the same lens and axes, and is to the right or the left. Of two at one distance the first counts.
-    """
+    """The nearest (first) view of the instant with the same lens, axes and rows; None without one."""
     if view.rig is None:
         return None
     place, distances = view.rig, dict[str, float]()
@@ -230,10 +204,7 @@ def _rectified_partner(view: View, views: Mapping[str, View]) -> View | None:
 def partner_table(
     partners: Mapping[Relation, View], cameras: Mapping[Relation, Camera]
 ) -> dict[str, Any]:
-    """Relation -> id, K, pose and time of the partner, for view.json; cameras: at the picture's size.
-
-    K: 3 x 3; the pose is 4 x 4, OpenCV's axes (x right, y down, z forward), metres.
-    """
+    """Relation -> id, K, pose (OpenCV's axes, metres) and time of the partner, for view.json."""
     return {
         relation: {
             "view": view.id,

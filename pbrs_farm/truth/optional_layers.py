@@ -116,10 +116,7 @@ def transparent_faces(geometry: Geometry, house: House) -> Mask:
 
 
 def source_classes(house: House) -> tuple[str, ...]:
-    """The source's own classes in house, sorted; id k of class_source.png is entry k - 1.
-
-    Empty without source classes. Depends on the house alone, so ids of two houses differ: compare names.
-    """
+    """The source's own classes in this house, sorted; id k of class_source.png is entry k - 1."""
     return tuple(sorted({item.source_class for item in house.items if item.source_class}))
 
 
@@ -253,10 +250,7 @@ def check_lens(names: Collection[str], lens: Lens) -> None:
 
 
 def optional_tables(names: Collection[str], house: House) -> dict[str, Any]:
-    """Tables of view.json for the named layers: "materials" and "source_classes" by id.
-
-    Keys are ids as text, from 1; 0 in a layer is nothing. Only layers that need a table have one.
-    """
+    """Tables of view.json, "materials" and "source_classes" by id from 1, of the layers that need them."""
     tables: dict[str, Any] = {}
     if "material" in names:
         tables["materials"] = {

@@ -1,8 +1,4 @@
-"""Dots of an infrared projector in a room, as the camera beside it sees them; no effects.
-
-Active stereo cameras (Intel's D400) and structured light (a first Kinect) have one, so that bare walls have
-something to match.
-"""
+"""Dots of an infrared projector (Intel's D400, a first Kinect), as the camera beside it sees them; no effects."""
 
 from __future__ import annotations
 
@@ -73,10 +69,7 @@ def _reached(
 
 
 def _dots(angles: F64) -> F64:
-    """(N,) brightness 0..1 of the pattern in directions (N, 2) in radians, right and up.
-
-    A dot is anywhere in the middle half of its cell; a hash of the cell decides if it has one.
-    """
+    """(N,) brightness 0..1 of directions (N, 2), radians: a hash decides if a cell has a dot in its middle half."""
     cell = np.floor(angles / CELL_RAD)
     key = (cell.astype(np.int64) & 0xFFFF).astype(np.uint64)
     mixed = _hash(key[:, 0] << np.uint64(16) | key[:, 1])

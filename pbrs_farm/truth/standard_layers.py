@@ -62,10 +62,7 @@ def valid_label(hit: HitRecord) -> NDArray[np.uint8]:
 
 
 def nyu40_of_instance(house: House) -> NDArray[np.uint8]:
-    """(n_items + 1,) uint8 NYU40 class of each instance id; 0 for "nothing" and for items without.
-
-    Raises BadHouse when an item's class is outside 0..40 or there are more than 65,535 items.
-    """
+    """(n_items + 1,) uint8 NYU40 class by instance id, 0 = none; BadHouse outside 0..40."""
     check_instances(house)
     # Entry 0 is "nothing": instance ids count from 1.
     classes = np.array([0, *(item.nyu40 for item in house.items)], np.int64)
@@ -77,10 +74,7 @@ def nyu40_of_instance(house: House) -> NDArray[np.uint8]:
 
 
 def check_instances(house: House) -> None:
-    """Raise BadHouse when instance ids do not fit in 16 bits.
-
-    Before rendering: a layer that wraps would be wrong without a word.
-    """
+    """Raise BadHouse, before rendering, when instance ids do not fit in 16 bits."""
     if len(house.items) > MAX_INSTANCES:
         raise BadHouse(
             house.source.file,

@@ -42,11 +42,7 @@ D455: Final = StereoSensor(848, 455.0, 0.095, 20.0)
 def stereo_depth(
     hit: HitRecord, camera: Camera, *, seed: int, sensor: StereoSensor = D435
 ) -> NDArray[np.uint16]:
-    """(H, W) uint16 depth_z in mm as the sensor measures it, 0 = no measurement.
-
-    Equal seeds give equal noise. Not modelled: walls without texture (the projector gives them
-    one), repeated patterns, reflections, glass.
-    """
+    """(H, W) uint16 measured mm, 0 = none, noise by seed; without untextured walls, patterns, glass."""
     # A block takes its nearest depth: objects grow by half a block.
     rng = np.random.default_rng(seed)
     size = max(round(WINDOW * hit.face.shape[1] / sensor.width_px) | 1, 3)

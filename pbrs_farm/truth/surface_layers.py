@@ -53,10 +53,7 @@ def albedo_label(
 def albedo_of_points(
     face: I32, uv: F32, house: House, geometry: Geometry, textures: Mapping[str, NDArray[np.uint8]]
 ) -> F32:
-    """(N, 3) float32 diffuse colour times texture, linear, of points of faces (N,) at uv (N, 2).
-
-    textures: as of albedo_label.
-    """
+    """(N, 3) linear diffuse colour times texture (as of albedo_label) at uv (N, 2) of faces (N,)."""
     linear = np.zeros((len(face), 3), np.float32)
     # Shade material by material: each texture is looked up once, for all its points.
     material = geometry.face_material[face]

@@ -55,11 +55,7 @@ L515: Final = TofSensor(0.25, 9.0, l515_noise_mm, 0.3)
 def tof_depth(
     hit: HitRecord, camera: Camera, *, seed: int, sensor: TofSensor = KINECT2
 ) -> NDArray[np.uint16]:
-    """(H, W) uint16 depth_z in mm as the sensor measures it, 0 = no measurement.
-
-    Equal seeds give equal noise. Not modelled: several paths of light (corners round off), dark and
-    shining surfaces, sunlight, motion.
-    """
+    """(H, W) uint16 measured mm, 0 = none, noise by seed; without multipath, dark surfaces, sun, motion."""
     # Gather light over each pixel's surroundings: on an edge of depth both sides mix.
     rng = np.random.default_rng(seed)
     z = hit.depth_z.astype(np.float64)

@@ -18,11 +18,7 @@ from pbrs_farm.truth.standard_layers import nyu40_of_instance
 
 
 def camera_table(camera: Camera) -> dict[str, Any]:
-    """Size, K and both poses of a camera, as view.json holds them.
-
-    Of another lens than a pin-hole also "lens" (its model and coefficients), and "depth": "planar"
-    along the axis, or "distance" along the ray.
-    """
+    """Size, K, both poses, and for other lenses than pin-holes "lens" and "depth", for view.json."""
     i = camera.intrinsics
     lens: dict[str, Any] = {}
     if not i.lens.is_pinhole:

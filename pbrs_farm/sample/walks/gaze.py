@@ -42,11 +42,7 @@ class WalkThings:
 
 
 def things_of(house: House) -> WalkThings:
-    """The house's furniture and items, weighted by the size of their boxes.
-
-    Doors, windows, structure and items without faces are excluded, as are items too small to fixate or as
-    large as a room. Weights grow with the square root of the size.
-    """
+    """The house's furniture and items neither tiny nor as large as a room, by the root of their size."""
     ids, middles, weights = [], [], []
     for number, item in enumerate(house.items, start=1):
         if item.kind.is_structure or is_door_item(item) or not item.n_faces:
@@ -79,10 +75,7 @@ def gaze(
     turn_rps: float,
     rng: np.random.Generator,
 ) -> tuple[F64, F64]:
-    """(N,) azimuth from +x towards +z and (N,) tilt downwards, radians; turning at most turn_rps.
-
-    Every one to three seconds another visible item, or the way ahead, is fixated.
-    """
+    """(N,) azimuth (+x to +z) and (N,) tilt down, radians, at most turn_rps, to an item every 1 to 3 s."""
     n = len(walker.times)
     step_s = float(walker.times[1] - walker.times[0]) if n > 1 else 1.0
     azimuth, tilt = np.zeros(n), np.zeros(n)

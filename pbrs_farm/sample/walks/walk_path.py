@@ -31,11 +31,7 @@ class Motion:
 
 
 def relax_path(way: F64, space: WalkSpace) -> F64:
-    """The way (M, 2) with its corners rounded; no point comes nearer to anything than half a way.
-
-    way: world (x, z), metres; its ends stay. The answer has points about CELL_M apart, not the same
-    number.
-    """
+    """The way (M, 2) with corners rounded, ends kept, clear by half a way, points about CELL_M apart."""
     places = _resampled(way, CELL_M)
     # Move each point towards its neighbours' middle, where that stays clear; the ends stay.
     for _round in range(_ROUNDS if len(places) > 2 else 0):
@@ -63,10 +59,7 @@ def _resampled(path: F64, step_m: float) -> F64:
 
 
 def spline_through(places: F64) -> F64:
-    """(M, 2) points 5 mm apart on the cubic B-spline with the places as control points.
-
-    It is twice continuous, and inside the hull of every four neighbours, so as clear as they are.
-    """
+    """(M, 2) points 5 mm apart on the cubic B-spline (inside its hull) of the places."""
     from scipy.interpolate import BSpline  # here: 0.1 s that only walks need
 
     control = _resampled(places, _CONTROL_M)
@@ -79,10 +72,7 @@ def spline_through(places: F64) -> F64:
 
 
 def time_walk(path: F64, times: F64, speed_mps: float) -> Motion:
-    """The walker on a path (M, 2) at ascending times (N,) s from 0; no faster than speed_mps.
-
-    It slows in turns and sets off and stops gently; at the path's end it stays.
-    """
+    """The walker on a path (M, 2) at times (N,) s, at most speed_mps, slower in turns, gentle at ends."""
     step = np.linalg.norm(np.diff(path, axis=0), axis=1)
     along = np.concatenate([[0.0], np.cumsum(step)])
     # Bound the speed by the curvature, then by what can be gained or lost on the way.

@@ -1,7 +1,4 @@
-"""A person's walk through a home as views in the order of time; no effects.
-
-Deterministic in house, fields and seed.
-"""
+"""A person's walk through a home, by fields and seed, as views in the order of time; no effects."""
 
 from __future__ import annotations
 

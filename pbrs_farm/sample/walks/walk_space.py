@@ -64,10 +64,7 @@ class WalkSpace:
 
 
 def walk_spaces(house: House) -> tuple[WalkSpace, ...]:
-    """The storeys that have rooms, in the house's order.
-
-    Rasters in plan, each made anew: keep the answer. A storey whose rooms have no area is left out.
-    """
+    """The storeys that have rooms with an area, in order, as new rasters in plan."""
     spaces = []
     for level in house.levels:
         rooms = [(k, r) for k, r in enumerate(house.rooms) if r.level_id == level.id]

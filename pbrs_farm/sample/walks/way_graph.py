@@ -56,11 +56,7 @@ class WayGraph:
 
 
 def way_through_rooms(space: WalkSpace, length_m: float, rng: np.random.Generator) -> F64:
-    """(M, 2) plan places about 5 cm apart: a way of at least length_m from room to room.
-
-    Rooms are visited nearest first, each with one or two places, and again when all have been.
-    The way is shorter where the region is a few cells alone.
-    """
+    """(M, 2) places 5 cm apart: from room to room, nearest first, again if short of length_m."""
     graph = WayGraph(space)
     room = space.room[tuple(graph.cells.T)]
     rooms = [int(k) for k in np.unique(room) if k >= 0 and (room == k).sum() >= _LEAST_ROOM_CELLS]
