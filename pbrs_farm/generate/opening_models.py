@@ -297,8 +297,9 @@ def _door_leaf_boxes(
     if kind in LIGHTS:
         for field in _lights(x, top, kind):
             add(panes, field, _PANEL_M / 3)
-            outer = tuple(c + s * _BEAD_M for c, s in zip(field, (-1, -1, 1, 1), strict=True))
-            for strip in _around(outer, _BEAD_M):
+            left, low, right, high = field
+            m = _BEAD_M
+            for strip in _around((left - m, low - m, right + m, high + m), m):
                 add(boxes, strip, _PANEL_M)
     for field in _panels(x, top, kind):
         is_board = kind in ("boards", "slats")
