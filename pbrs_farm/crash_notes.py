@@ -29,6 +29,7 @@ class _Waiting:
     count = ""  # "3 of 40 views"
     n_displays = 0  # displays that replace the lines
     is_shown = False  # a thread writes lines
+    is_watched = False  # another process reports if this one crashes
 
 
 _NOW: Final = _Waiting()
@@ -51,6 +52,17 @@ def note_step(file: str, step: str) -> None:
 def send_notes_to(notes: int) -> None:
     """Write notes of this thread's context to a file descriptor from now on."""
     _FILE.set(notes)
+    set_watched()
+
+
+def set_watched(watched: bool = True) -> None:
+    """Set whether another process watches this one, so that a crash costs one line."""
+    _NOW.is_watched = watched
+
+
+def is_watched() -> bool:
+    """True if another process reports a crash of this one."""
+    return _NOW.is_watched
 
 
 def current_step() -> str:

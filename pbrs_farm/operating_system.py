@@ -44,6 +44,9 @@ except (ImportError, ValueError, OSError):
 """
 """Code that limits a process to 8 GiB of memory, where the system supports it."""
 
+PATH_FROM_PARENT: Final = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
+"""Code of a child that sees the modules its parent sees, wherever it was started."""
+
 
 # Processes
 

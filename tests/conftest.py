@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import tests.hypothesis_profiles  # noqa: F401  loads a profile before tests are imported
+from pbrs_farm.crash_notes import set_watched
 from tests.cpu_times import pytest_runtest_setup, pytest_runtest_teardown, pytest_terminal_summary
 from tests.long_tests import pytest_collection_modifyitems
 from tests.no_skips import pytest_make_collect_report, pytest_runtest_makereport
@@ -18,3 +19,6 @@ __all__ = [
     "pytest_runtest_teardown",
     "pytest_terminal_summary",
 ]
+
+# IFC files are read in this process: a child for each would take a second.
+set_watched()

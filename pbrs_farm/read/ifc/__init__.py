@@ -8,9 +8,11 @@ from pbrs_farm.read.common.format import Format, GivenFile
 
 
 def _read_ifc(given: GivenFile, fields: ReadFields) -> House:
-    from pbrs_farm.read.ifc import building
+    from pbrs_farm.installation import need
+    from pbrs_farm.read.common.own_process import read_apart
 
-    return building.read_ifc(given, fields)
+    need("ifcopenshell")
+    return read_apart("pbrs_farm.read.ifc.building:read_ifc", given, fields)
 
 
 # fmt: off

@@ -33,7 +33,6 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.geometry.plan_surfaces import horizontal
 from pbrs_farm.home.names import names_glass, words_of
 from pbrs_farm.home.room_use import RoomKind, named_kind
-from pbrs_farm.installation import need
 from pbrs_farm.read.common.doors_and_windows import fill_hole
 from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.furniture_classes import PieceSize
@@ -84,8 +83,7 @@ _ATTIC_WORDS: Final = ROOF_WORDS | {"attic", "dachraum", "dachboden", "loft", "Ñ
 
 
 def read_ifc(given: GivenFile, fields: ReadFields) -> House:
-    """The House of the file, in metres, y up; BadHouse names the place, MachineFailed a missing ifcopenshell."""
-    need("ifcopenshell")
+    """The House of the file, in metres, y up; BadHouse names the place."""
     return _Building(given.path, fields).house()
 
 

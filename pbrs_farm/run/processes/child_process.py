@@ -12,12 +12,15 @@ from dataclasses import asdict, dataclass, field
 from pathlib import Path
 from typing import Any, Final, Literal, Protocol
 
-from pbrs_farm.operating_system import OWN_SESSION, ReplyPipe, end_tree, resident_mb
+from pbrs_farm.operating_system import (
+    OWN_SESSION,
+    PATH_FROM_PARENT,
+    ReplyPipe,
+    end_tree,
+    resident_mb,
+)
 
 _CLOSE_S: Final = 10.0  # what freeing GL and Mitsuba may take
-PATH_FROM_PARENT: Final = "import json, sys; sys.path[:] = json.loads(sys.argv[1]); "
-"""Code of a child that sees the modules its parent sees, wherever it was started."""
-
 _BOOT: Final = PATH_FROM_PARENT + (
     "from pbrs_farm.run.processes.task_loop import end, main; end(main(sys.argv[2]))"
 )

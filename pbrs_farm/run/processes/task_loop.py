@@ -16,6 +16,7 @@ import sys
 import traceback
 from typing import BinaryIO, NoReturn
 
+from pbrs_farm.crash_notes import set_watched
 from pbrs_farm.operating_system import die_with_parent
 from pbrs_farm.run.processes.child_process import Message
 
@@ -27,6 +28,7 @@ def main(target: str) -> int:
     Returns 1, after a message, if the handler cannot be made.
     """
     die_with_parent()
+    set_watched()
     # The parent decides what Ctrl-C and TERM mean; Slurm signals every process of a step.
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, signal.SIG_IGN)

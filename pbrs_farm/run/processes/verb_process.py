@@ -15,8 +15,7 @@ from pathlib import Path
 from typing import Final
 
 from pbrs_farm.crash_notes import send_notes_to
-from pbrs_farm.operating_system import die_with_parent, ending, has_crashed
-from pbrs_farm.run.processes.child_process import PATH_FROM_PARENT
+from pbrs_farm.operating_system import PATH_FROM_PARENT, die_with_parent, ending, has_crashed
 
 _BOOT: Final = PATH_FROM_PARENT + (
     "from pbrs_farm.run.processes.verb_process import main; "

@@ -14,8 +14,10 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House, ItemKind, MaterialKind, corners_of_surfaces
 from pbrs_farm.core.mesh import signed_volume
 from pbrs_farm.core.recipe import ReadFields, RepairFields
+from pbrs_farm.crash_notes import set_watched
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve
+from pbrs_farm.read.ifc import building as building_module
 from pbrs_farm.repair import repair
 from tests.inputs.ifc_files import IfcHouse, roof, storey_of_two_rooms
 from tests.repair.embree import EmbreeOccluder
@@ -193,6 +195,17 @@ def test_a_zipped_building_is_read(tmp_path: Path) -> None:
     with zipfile.ZipFile(tmp_path / "a.ifczip", "w", zipfile.ZIP_DEFLATED) as archive:
         archive.writestr("a.ifc", two_rooms().text())
     assert len(read_house(resolve(str(tmp_path / "a.ifczip")), ReadFields()).rooms) == 2
+
+
+def test_the_library_runs_in_a_child_that_may_crash(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr(building_module, "read_ifc", None)
+    set_watched(False)
+    try:
+        assert len(read(two_rooms(), tmp_path).rooms) == 2
+    finally:
+        set_watched()
 
 
 def _cyclic(text: str) -> str:
