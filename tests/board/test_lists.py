@@ -33,6 +33,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import opencv_world_from_camera
 from pbrs_farm.core.keys import canonical_json
+from pbrs_farm.core.layers import LAYERS
 from pbrs_farm.curate.teaching_rules import REASONS as RULE_REASONS
 from pbrs_farm.images import array_from_png, decode_photo
 from pbrs_farm.sample.camera_report import Verdict
@@ -339,6 +340,16 @@ def test_pages_cut_a_long_list_without_loss(tmp_path: Path) -> None:
     ids = [v.id for page in listed[:3] for v in page.rows]
     assert ids == [v.id for v in views]
     assert listed[3].number == 3
+
+
+def test_a_view_with_every_layer_is_listed_with_each(tmp_path: Path) -> None:
+    # An integer of SQLite has 64 bits, fewer than there are layers.
+    index = ViewIndex(tmp_path / "i.sqlite")
+    view = ViewRow("0_0_1", "Hall", (1 << len(LAYERS)) - 1, 2, ())
+    index.enter([(HouseRow("a-1", "Home", "", 1, (view,)), "x")])
+    queries = Queries(index)
+    assert queries.view("a-1", "0_0_1").row()["layers"] == [layer.name for layer in LAYERS]
+    assert len(queries.menus()["layer"]) == len(LAYERS) - 1
 
 
 @pytest.mark.parametrize("text", ["", "0", "-1", "x", "1e9", "99999999999", "²"])

@@ -11,7 +11,7 @@ from typing import Any, Final, Generic, TypeVar
 from urllib.parse import urlencode
 
 from pbrs_farm.board.index.house_rows import LAYER_BIT
-from pbrs_farm.board.index.view_index import ViewIndex
+from pbrs_farm.board.index.view_index import LAYERS_PER_COLUMN, ViewIndex
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.layers import LAYERS
 from pbrs_farm.core.lighting import ALL_MODES
@@ -219,9 +219,9 @@ class Queries:
 
     def _counted_contents(self, _generation: int) -> dict[str, list[tuple[str, int]]]:
         bits: list[tuple[int, int, int]] = [
-            (r["classes"], r["layers"], r["n"])
+            (r["classes"], _layers(r), r["n"])
             for r in self._index.rows(
-                "SELECT classes, layers, count(*) AS n FROM view GROUP BY classes, layers"
+                "SELECT classes, layers, more_layers, count(*) AS n FROM view GROUP BY 1, 2, 3"
             )
         ]
         classes = {
@@ -275,11 +275,11 @@ class Queries:
             "SELECT reason, count(*) AS n FROM view WHERE reason != '' GROUP BY reason"
             f" ORDER BY n DESC LIMIT {_MAX_MENU}"
         )
-        bits = rows("SELECT DISTINCT classes, layers FROM view LIMIT 20000")
+        bits = rows("SELECT DISTINCT classes, layers, more_layers FROM view LIMIT 20000")
         classes = layers = 0
         for row in bits:
             classes |= row["classes"]
-            layers |= row["layers"]
+            layers |= _layers(row)
         return {
             # Without a menu, many homes can be searched by words.
             "home": [(r["id"], r["name"]) for r in homes] if len(homes) <= _MAX_MENU else [],
@@ -315,10 +315,14 @@ _VIEW: Final = (
 )
 
 
+def _layers(row: Any) -> int:
+    return int(row["layers"] | row["more_layers"] << LAYERS_PER_COLUMN)
+
+
 def _view(row: Any) -> ListedView:
     warnings = tuple(json.loads(row["warnings"]))
     return ListedView(
-        row["house"], row["house_name"], row["id"], row["room"], row["layers"], warnings,
+        row["house"], row["house_name"], row["id"], row["room"], _layers(row), warnings,
         row["reason"], row["fingerprint"],
     )  # fmt: skip
 

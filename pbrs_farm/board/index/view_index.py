@@ -16,7 +16,8 @@ from typing import Any, Final
 from pbrs_farm.board.index.house_rows import HouseRow
 from pbrs_farm.core.lighting import ALL_MODES
 
-_VERSION: Final = 3  # of the tables below and of covers
+_VERSION: Final = 4  # of the tables below and of covers
+LAYERS_PER_COLUMN: Final = 62  # bits: an integer of SQLite has 64
 _SCHEMA: Final = f"""
 PRAGMA journal_mode = WAL;
 CREATE TABLE IF NOT EXISTS house (
@@ -26,7 +27,7 @@ CREATE TABLE IF NOT EXISTS house (
 ) WITHOUT ROWID;
 CREATE TABLE IF NOT EXISTS view (
     house TEXT NOT NULL, id TEXT NOT NULL, room TEXT NOT NULL, layers INTEGER NOT NULL,
-    classes INTEGER NOT NULL, warnings TEXT NOT NULL, reason TEXT,
+    more_layers INTEGER NOT NULL, classes INTEGER NOT NULL, warnings TEXT NOT NULL, reason TEXT,
     n_objects INTEGER NOT NULL, lux REAL,
     PRIMARY KEY (house, id)
 ) WITHOUT ROWID;
@@ -126,13 +127,14 @@ def _enter_house(connection: sqlite3.Connection, house: HouseRow, fingerprint: s
     )
     connection.execute("DELETE FROM view WHERE house = ?", (house.id,))
     connection.executemany(
-        "INSERT INTO view VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO view VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         (
             (
                 house.id,
                 v.id,
                 v.room,
-                v.layers,
+                v.layers & (1 << LAYERS_PER_COLUMN) - 1,
+                v.layers >> LAYERS_PER_COLUMN,
                 v.classes,
                 json.dumps(v.warnings),
                 reasons.get(v.id),
