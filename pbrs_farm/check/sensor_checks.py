@@ -1,10 +1,13 @@
 """Layers that follow from depth and normals: hha by its formula, depth sensors by their statistics.
 
+Why a sensor has no reading is judged by the surfaces around the pixel: a reason must hold there.
 Effects: none. The numbers are those of docs/formats/layer_rules.md. A noisy pixel must be within the range of its
 neighbours, and the mean over flat surfaces near 0.
 """
 
 from __future__ import annotations
+
+from typing import NamedTuple
 
 import numpy as np
 from scipy import ndimage
@@ -12,6 +15,8 @@ from scipy import ndimage
 from pbrs_farm.check.axes import dot, world_normals
 from pbrs_farm.check.cases import ViewCase
 from pbrs_farm.check.checks import Check
+from pbrs_farm.check.colours import linear_from_srgb
+from pbrs_farm.check.pixel_checks import albedo_of_faces
 from pbrs_farm.core.arrays import F64, Bools
 
 _HHA_STEPS = 1.51  # of 255: rounding, and half a millimetre of depth
@@ -29,6 +34,23 @@ _TOF_REACH_M = {
     "depth_sensor_azure": (0.5, 3.86),
     "depth_sensor_l515": (0.25, 9.0),
 }
+# Layer of reasons -> its sensor; the reasons, by their numbers.
+_HOLES = {name.replace("sensor", "hole"): name for name in (*_MATCHING, *_TOF_REACH_M)}
+_CLEAR, _MIRROR, _TOO_DARK, _TOO_NEAR, _TOO_FAR, _GRAZING, _SHADOW, _EDGE = range(1, 9)
+# Least light that a sensor needs, share over m^2: 95 % or 15 % of it at the farthest reach.
+_LEAST_RETURN = {
+    "depth_sensor": 0.95 / 8.0**2,
+    "depth_sensor_stereo": 0.95 / 10.0**2,
+    "depth_sensor_d455": 0.95 / 20.0**2,
+    "depth_sensor_tof": 0.15 / 4.5**2,
+    "depth_sensor_azure": 0.15 / 3.86**2,
+    "depth_sensor_l515": 0.95 / 9.0**2,
+}
+_LARGEST_ANGLE_DEG = {"depth_sensor": 82.0, **dict.fromkeys(_TOF_REACH_M, 85.0)}
+_BASELINE_M = {"depth_sensor": 0.075, "depth_sensor_stereo": 0.05, "depth_sensor_d455": 0.095}
+_MOST_DISPARITY_PX = 126.0
+_FAR_SHARE = 0.75  # of the farthest reach, from which noise may exceed it
+_COLOUR_STEPS = 2.5  # of 255
 _SIGMAS = 6.5  # of noise, for a pixel
 _FLAT_SIGMAS = 0.8  # of noise: range of the neighbours of a flat pixel
 _SLANT_SIGMAS = 8.0  # the same of a time-of-flight sensor
@@ -53,6 +75,11 @@ def check_derived(case: ViewCase) -> None:
     for name in _TOF_REACH_M:
         if name in case.arrays:
             _check_tof(case, name)
+    if any(name in case.arrays for name in _HOLES):
+        seen = _seen_by_sensors(case)
+        for name, sensor in _HOLES.items():
+            if name in case.arrays:
+                _check_holes(case, name, sensor, seen)
 
 
 def _check_hha(case: ViewCase) -> None:
@@ -138,6 +165,102 @@ def _tof_sigma_m(name: str, z: F64, angle: F64) -> F64:
     return np.maximum(1.5 - 0.5 * far + 0.3 * far**2 + 0.1 * far**1.5 * slant, 0.5) / 1000
 
 
+class _Seen(NamedTuple):
+    """The surfaces of all pixels, as far as sensors depend on them; each (H, W)."""
+
+    z: F64  # m, 0 = nothing
+    angle: F64  # rad, between ray and normal
+    clear: Bools
+    mirror: Bools
+    most_return: F64  # share of light over m^2, with the tolerance of a stored colour
+    least_return: F64
+
+
+def _seen_by_sensors(case: ViewCase) -> _Seen:
+    """Cast rays through all pixels, for materials; depth and normals are those of the stored layers."""
+    shape = case.arrays["depth"].shape
+    cast = case.cast(*(n.reshape(-1) for n in np.indices(shape)))
+    triangles, is_hit = case.now.triangles, cast.face >= 0
+    kinds = triangles.kinds_of(cast.face) if len(triangles.faces) else np.zeros(len(cast), str)
+    srgb = albedo_of_faces(case.view, cast.face, cast.point, triangles).max(1)
+    length = np.linalg.norm(cast.directions, axis=1)
+    cosine = np.abs(dot(cast.normal, cast.directions)) / np.maximum(length, 1e-9)
+    share = np.divide(
+        cosine, (cast.z * length) ** 2, out=np.full(len(cast), np.inf), where=is_hit & (cast.z > 0)
+    )
+    returns = [
+        share * (linear_from_srgb(np.clip(srgb + by, 0, 255) / 255) + by * 1e-5)
+        for by in (_COLOUR_STEPS, -_COLOUR_STEPS)
+    ]
+    arrays = (
+        case.arrays["depth"] / 1000,
+        np.arccos(np.clip(cosine, 0, 1)),
+        np.isin(kinds, ("glass", "pane")),
+        kinds == "mirror",
+        *returns,
+    )
+    return _Seen(*(np.asarray(a).reshape(shape) for a in arrays))
+
+
+def _check_holes(case: ViewCase, name: str, sensor: str, seen: _Seen) -> None:
+    """Each reason holds beside the pixel, and only pixels with a reason lack a measurement."""
+    stored, nothing = case.arrays[name], seen.z == 0
+    (nearest, farthest), least = _sensor_reach(sensor), _LEAST_RETURN[sensor]
+    near_z = np.where(nothing, np.inf, seen.z)
+    reasons = {
+        _CLEAR: seen.clear,
+        _MIRROR: seen.mirror,
+        _TOO_DARK: ~nothing & (seen.least_return < least),
+        _TOO_NEAR: near_z < nearest * 1.1,
+        _TOO_FAR: near_z > farthest * _FAR_SHARE,
+    }
+    if sensor in _LARGEST_ANGLE_DEG:
+        steep = seen.angle > np.radians(_LARGEST_ANGLE_DEG[sensor] - 0.1)
+        reasons[_GRAZING] = ~nothing & steep
+    if sensor in _BASELINE_M:
+        reasons[_SHADOW] = _in_shadow(case, sensor, near_z)
+    if sensor == "depth_sensor_azure":
+        low, high = (
+            f(near_z, 3, mode="nearest") for f in (ndimage.minimum_filter, ndimage.maximum_filter)
+        )
+        with np.errstate(invalid="ignore"):
+            reasons[_EDGE] = ~(high - low <= 0.029 * low)
+    right = stored == 0
+    for reason, holds in reasons.items():
+        beside = ndimage.maximum_filter(holds, _REACH_PX, mode="nearest")
+        right |= (stored == reason) & beside
+    # A surface that no sensor measures, with nothing else about it.
+    blind = seen.clear | seen.mirror | nothing | (seen.most_return < least)
+    right &= ~((stored == 0) & ndimage.minimum_filter(blind, _REACH_PX, mode="nearest"))
+    if sensor in case.arrays:
+        measured = case.arrays[sensor] > 0
+        by_material = np.isin(stored, (0, _CLEAR, _MIRROR, _TOO_DARK))
+        right &= np.where(measured, by_material, stored > 0)
+    case.tally.pixels(f"{name}: reasons", case.place, right)
+
+
+def _sensor_reach(sensor: str) -> tuple[float, float]:
+    """Nearest and farthest depth in m; of stereo cameras the nearest that their search of 126 px finds."""
+    if sensor in _TOF_REACH_M:
+        return _TOF_REACH_M[sensor]
+    fb, _steps, _noise, (nearest, farthest) = _MATCHING[sensor]
+    return nearest or fb / _MOST_DISPARITY_PX, farthest
+
+
+def _in_shadow(case: ViewCase, sensor: str, z: F64) -> Bools:
+    """(H, W) pixels that a surface to the right hides from a point beside the camera, or outside its picture."""
+    if sensor != "depth_sensor":
+        size = max(round(5 * z.shape[1] / 848) | 1, 3)
+        z = ndimage.minimum_filter(z, size, mode="nearest")
+    places = np.arange(z.shape[1]) - case.view.k[0, 0] * _BASELINE_M[sensor] / z
+    hidden = np.zeros(z.shape, bool)
+    first = places[:, -1]
+    for column in range(z.shape[1] - 1, -1, -1):
+        first = np.minimum(first, places[:, column])
+        hidden[:, column] = places[:, column] > first + 0.4
+    return hidden | (places < -0.4) if sensor != "depth_sensor" else hidden
+
+
 def _extremes(values: F64) -> tuple[F64, F64]:
     """(H, W) least and largest value around each pixel; NaN without values."""
     is_value = np.isfinite(values)
@@ -176,4 +299,13 @@ def _check_statistics(
     expect(_SPREAD[0] <= spread <= _SPREAD[1], fault)
 
 
-CHECKS = (Check("derived layers", "view", check_derived, 15, ("hha", *_MATCHING, *_TOF_REACH_M)),)
+CHECKS = (
+    Check(
+        "derived layers",
+        "view",
+        check_derived,
+        15,
+        ("hha", *_MATCHING, *_TOF_REACH_M, *_HOLES),
+        {f"{name}.png": "each reason holds for a surface beside the pixel" for name in _HOLES},
+    ),
+)

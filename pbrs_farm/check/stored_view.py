@@ -20,8 +20,8 @@ from pbrs_farm.core.recipe import Recipe, recipe_from_json
 from pbrs_farm.core.shot import Shot
 from pbrs_farm.images import array_from_png, layers_from_exr
 
+_STACKED = {x.file: x.n_stacked for x in LAYERS if x.n_stacked > 1}
 BASIC = tuple(x.name for x in LAYERS if x.step == "truth" and not x.optional)
-_DEPTHS = {"RGB": (3,), "R G B": (3,), "X Y Z": (3,), "X Y": (2,)}  # of vectors and colours
 
 
 @dataclass(frozen=True)
@@ -99,8 +99,10 @@ class StoredView:
         return (self.folder / file).is_file()
 
     def png(self, file: str) -> NDArray[Any]:
-        """Pixels of a PNG; BadInput if it cannot be read."""
-        return array_from_png(self._bytes(file), f"{self.place}/{file}")
+        """Pixels of a PNG, pictures below one another as channels; BadInput if it cannot be read."""
+        array = array_from_png(self._bytes(file), f"{self.place}/{file}")
+        n = _STACKED.get(file, 1)
+        return np.stack(np.split(array, n), axis=-1) if n > 1 and len(array) % n == 0 else array
 
     def exr(self, file: str) -> dict[str, F32]:
         """Channels of an EXR; BadInput if it cannot be read."""
@@ -172,7 +174,8 @@ def _read_layer(view: StoredView, layer: Layer, tally: Tally) -> NDArray[Any] | 
     except (BadInput, KeyError) as error:
         expect(False, str(error))
         return None
-    shape = (*view.size, *_DEPTHS.get(layer.channels, ()))
+    n = 3 if layer.channels == "RGB" else len(layer.channels.split())
+    shape = view.size if n == 1 else (*view.size, n)
     # EXR files are read as 32-bit floats, whatever they hold.
     dtype = "float32" if layer.dtype == "float16" else layer.dtype
     fits = array.shape == shape and str(array.dtype) == dtype

@@ -63,6 +63,11 @@ class Layer:
         return self.shown_as in ("classes", "ids", "mask")
 
     @property
+    def n_stacked(self) -> int:
+        """Number of pictures below one another in its PNG: 1, or that of the surfaces of depth_layers."""
+        return len(self.channels.split()) if self.file.endswith(".png") else 1
+
+    @property
     def is_photo(self) -> bool:
         """Whether it is a picture in a light, shown as its own file."""
         return self.shown_as == "picture" and self.step != "truth"
@@ -206,7 +211,8 @@ def layer_table() -> str:
         if x.file in _VARIANTS and x is not first:
             continue
         file = f"`{first.file}` to `{last.file}`" if x is first else f"`{x.file}`"
-        rows.append(f"| {file} | {x.channels} | {x.dtype} | {x.unit} | {x.nodata} |")
+        channels = f"{x.n_stacked} x Y" if x.n_stacked > 1 else x.channels
+        rows.append(f"| {file} | {channels} | {x.dtype} | {x.unit} | {x.nodata} |")
     return "\n".join(rows)
 
 

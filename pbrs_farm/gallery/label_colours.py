@@ -90,7 +90,9 @@ def boundary_colours(boundary: NDArray[np.uint8]) -> Srgb8Image:
 
 
 def shown_colours(layer: Layer, stored: NDArray[Any]) -> Srgb8Image:
-    """(H, W, 3) uint8 sRGB of a stored array by layer.shown_as; KeyError for radiance."""
+    """(H, W, 3) uint8 sRGB of a stored array by layer.shown_as, of depth_layers its second surface; KeyError for radiance."""
+    if stored.ndim == 3 and stored.shape[2] > 4:
+        stored = stored[..., 1].astype(np.int64)
     return _SHOWN[layer.shown_as](stored)
 
 

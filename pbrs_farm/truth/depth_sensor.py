@@ -13,6 +13,7 @@ from scipy import ndimage
 
 from pbrs_farm.core.arrays import F32, F64, I64, HitRecord, Mask
 from pbrs_farm.core.camera import Camera
+from pbrs_farm.truth.sensor_reading import FULL_REFLECTANCE, Hole, Reading, depth_reading
 
 FOCAL_PX = 580.0  # the sensor's infrared camera, Khoshelham and Elberink 2012
 BASELINE_M = 0.075  # from camera to projector, the same source
@@ -26,10 +27,16 @@ MAX_ANGLE_RAD = np.radians(82)  # from the normal; beyond it nothing returns, Ng
 
 
 def sensor_depth(hit: HitRecord, camera: Camera, *, seed: int) -> NDArray[np.uint16]:
-    """(H, W) uint16 measured mm, 0 = none, noise by seed; without interreflection, sun, glass, drift."""
+    """(H, W) uint16 measured mm, 0 = none."""
+    return kinect_reading(hit, camera, seed=seed).depth_mm
+
+
+def kinect_reading(hit: HitRecord, camera: Camera, *, seed: int) -> Reading:
+    """Measured depth, noise by seed, and reasons for holes; without interreflection, sun, glass, drift."""
     # Read the depth of a pixel nearby where projector and camera both see the surface.
     rng = np.random.default_rng(seed)
-    reached = hit.valid & ~_grazing(hit, camera) & ~_in_projector_shadow(hit.depth_z, camera)
+    grazing, shadow = _grazing(hit, camera), _in_projector_shadow(hit.depth_z, camera)
+    reached = hit.valid & ~grazing & ~shadow
     rows, columns = _laterally_moved(hit.face.shape, rng)
     z = np.where(reached, hit.depth_z, 0)[rows, columns].astype(np.float64)
 
@@ -37,8 +44,17 @@ def sensor_depth(hit: HitRecord, camera: Camera, *, seed: int) -> NDArray[np.uin
     with np.errstate(divide="ignore"):
         disparity = FOCAL_PX * BASELINE_M / z + DISPARITY_NOISE_PX * _patchy(z.shape, rng)
         measured = FOCAL_PX * BASELINE_M / (np.rint(disparity * STEPS_PER_PX) / STEPS_PER_PX)
-    good = (z > 0) & (measured >= NEAREST_M) & (measured <= FARTHEST_M)
-    return np.where(good, np.rint(np.where(good, measured, 0) * 1000), 0).astype(np.uint16)
+    is_near = (measured >= 0) & (measured < NEAREST_M)
+    in_reach = ~is_near & (measured >= 0) & (measured <= FARTHEST_M)
+    valid = hit.valid[rows, columns]
+    faults = {
+        Hole.TOO_NEAR: (z > 0) & is_near,
+        Hole.TOO_FAR: ~valid | ((z > 0) & ~is_near & ~in_reach),
+        Hole.GRAZING: valid & grazing[rows, columns],
+        Hole.SHADOW: valid & shadow[rows, columns],
+    }
+    least_return = FULL_REFLECTANCE / FARTHEST_M**2
+    return depth_reading(measured, faults, least_return, lambda mask: mask[rows, columns])
 
 
 def _grazing(hit: HitRecord, camera: Camera) -> Mask:

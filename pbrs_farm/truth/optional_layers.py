@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Collection, Mapping
 from dataclasses import dataclass, field
-from functools import cached_property
+from functools import cached_property, partial
 from typing import Any
 
 import numpy as np
@@ -20,7 +20,7 @@ from pbrs_farm.core.lenses import Lens
 from pbrs_farm.core.plugins import plugins
 from pbrs_farm.truth.articulation import part_label
 from pbrs_farm.truth.boundary import instance_boundary, typed_boundaries
-from pbrs_farm.truth.depth_sensor import sensor_depth
+from pbrs_farm.truth.depth_sensor import kinect_reading
 from pbrs_farm.truth.mirrored_hits import mirror_faces, mirrored_hits
 from pbrs_farm.truth.optical_flow import (
     Correspondence,
@@ -32,7 +32,9 @@ from pbrs_farm.truth.optical_flow import (
     flow_label,
     scene_flow_label,
 )
+from pbrs_farm.truth.pierced_surfaces import PiercedSurfaces, pierced_surfaces
 from pbrs_farm.truth.projector import projector_label
+from pbrs_farm.truth.sensor_reading import Reading, hole_label
 from pbrs_farm.truth.standard_layers import (
     depth_mm,
     encoded_normal,
@@ -40,9 +42,10 @@ from pbrs_farm.truth.standard_layers import (
     normal_label,
     semantic_label,
 )
-from pbrs_farm.truth.stereo_sensor import D455, stereo_depth
+from pbrs_farm.truth.stereo_sensor import D455, stereo_reading
 from pbrs_farm.truth.surface_layers import (
     albedo_label,
+    albedo_of_points,
     f0_label,
     hha_label,
     metallic_label,
@@ -50,7 +53,7 @@ from pbrs_farm.truth.surface_layers import (
     roughness_label,
     shading_normals,
 )
-from pbrs_farm.truth.tof_sensor import AZURE, L515, tof_depth
+from pbrs_farm.truth.tof_sensor import AZURE, L515, tof_reading
 
 HitWithout = Callable[[Mask], HitRecord]  # (F,) bool faces to ignore -> the same camera's hits
 
@@ -88,6 +91,11 @@ class LabelInputs:
         return mirrored_hits(
             self.hit, self.camera, self.geometry, self.house, self.first_hit, self.textures
         )
+
+    @cached_property
+    def surfaces(self) -> PiercedSurfaces:
+        """All surfaces along the pixels' rays; ValueError without first_hit if anything is hit."""
+        return pierced_surfaces(self.hit, self.camera, self.geometry, self.first_hit)
 
     @cached_property
     def to_partners(self) -> dict[Relation, Correspondence]:
@@ -164,6 +172,39 @@ def _projector(inputs: LabelInputs) -> NDArray[np.uint8]:
     return projector_label(s.hit, s.camera, partner, albedo, inputs.first_hit)
 
 
+def _clear_surfaces(inputs: LabelInputs) -> NDArray[np.uint8]:
+    face = inputs.surfaces.face
+    clear = np.append(transparent_faces(inputs.geometry, inputs.house), False)  # the last: face -1
+    return np.where(clear[face], np.uint8(255), np.uint8(0))
+
+
+def _sensor_depth(inputs: LabelInputs, sensor: str) -> NDArray[np.uint16]:
+    return _SENSORS[sensor](inputs).depth_mm
+
+
+def _hole(inputs: LabelInputs, sensor: str) -> NDArray[np.uint8]:
+    s, is_hit = inputs, inputs.hit.valid
+    reflectance = np.zeros(is_hit.shape)
+    if is_hit.any():
+        points = s.hit.face[is_hit], s.hit.points.uv[is_hit]
+        albedo = albedo_of_points(*points, s.house, s.geometry, s.textures)
+        # As for laser scans: dyes are bright in infrared, so the brightest channel counts.
+        reflectance[is_hit] = albedo.max(1)
+    clear = _mask(s, transparent_faces(s.geometry, s.house)) > 0
+    mirror = _mask(s, mirror_faces(s.geometry, s.house)) > 0
+    return hole_label(_SENSORS[sensor](s), s.hit, s.camera, clear, mirror, reflectance)
+
+
+# The depth sensors, by what follows the names of their layers.
+_SENSORS: Mapping[str, Callable[[LabelInputs], Reading]] = {
+    "": lambda s: kinect_reading(s.hit, s.camera, seed=s.seed),
+    "_tof": lambda s: tof_reading(s.hit, s.camera, seed=s.seed),
+    "_stereo": lambda s: stereo_reading(s.hit, s.camera, seed=s.seed),
+    "_d455": lambda s: stereo_reading(s.hit, s.camera, seed=s.seed, sensor=D455),
+    "_azure": lambda s: tof_reading(s.hit, s.camera, seed=s.seed, sensor=AZURE),
+    "_l515": lambda s: tof_reading(s.hit, s.camera, seed=s.seed, sensor=L515),
+}
+
 # How each optional layer of core/layers.py is computed.
 _LAYER_FUNCTIONS: Mapping[str, Callable[[LabelInputs], NDArray[Any]]] = {
     # Geometry of the hit.
@@ -193,18 +234,19 @@ _LAYER_FUNCTIONS: Mapping[str, Callable[[LabelInputs], NDArray[Any]]] = {
     "behind_mirror_normal": lambda s: _normal(s, s.behind_mirror),
     "behind_mirror_semantic": lambda s: semantic_label(s.behind_mirror.item, s.house),
     "behind_mirror_instance": lambda s: instance_label(s.behind_mirror.item, s.house),
+    # All surfaces along the ray.
+    "depth_layers": lambda s: depth_mm(s.surfaces.depth_z),
+    "depth_layers_semantic": lambda s: semantic_label(s.surfaces.item, s.house),
+    "depth_layers_instance": lambda s: instance_label(s.surfaces.item, s.house),
+    "depth_layers_clear": _clear_surfaces,
     # Edges, and what sensors and encoders make of depth.
     "boundary_occlusion": lambda s: s.boundaries[0],
     "boundary_semantic": lambda s: instance_boundary(semantic_label(s.hit.item, s.house)),
     "boundary_crease": lambda s: s.boundaries[1],
     "hha": lambda s: hha_label(s.hit, s.camera),
     "projector": _projector,
-    "depth_sensor": lambda s: sensor_depth(s.hit, s.camera, seed=s.seed),
-    "depth_sensor_tof": lambda s: tof_depth(s.hit, s.camera, seed=s.seed),
-    "depth_sensor_stereo": lambda s: stereo_depth(s.hit, s.camera, seed=s.seed),
-    "depth_sensor_d455": lambda s: stereo_depth(s.hit, s.camera, seed=s.seed, sensor=D455),
-    "depth_sensor_azure": lambda s: tof_depth(s.hit, s.camera, seed=s.seed, sensor=AZURE),
-    "depth_sensor_l515": lambda s: tof_depth(s.hit, s.camera, seed=s.seed, sensor=L515),
+    **{f"depth_sensor{k}": partial(_sensor_depth, sensor=k) for k in _SENSORS},
+    **{f"depth_hole{k}": partial(_hole, sensor=k) for k in _SENSORS},
     # Where the hits lie in other views.
     "flow_forward": lambda s: flow_label(s.to_partners["next"]),
     "flow_forward_kitti": lambda s: flow_kitti(s.to_partners["next"]),

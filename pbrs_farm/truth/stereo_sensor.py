@@ -15,6 +15,7 @@ from scipy import ndimage
 
 from pbrs_farm.core.arrays import F64, HitRecord, Mask
 from pbrs_farm.core.camera import Camera
+from pbrs_farm.truth.sensor_reading import FULL_REFLECTANCE, Hole, Reading, depth_reading
 
 STEREO_DISPARITY_NOISE_PX = 0.08  # standard deviation of sub-pixel matching on a textured wall
 STEREO_STEPS_PER_PX = 32  # quantisation of disparity
@@ -42,7 +43,14 @@ D455: Final = StereoSensor(848, 455.0, 0.095, 20.0)
 def stereo_depth(
     hit: HitRecord, camera: Camera, *, seed: int, sensor: StereoSensor = D435
 ) -> NDArray[np.uint16]:
-    """(H, W) uint16 measured mm, 0 = none, noise by seed; without untextured walls, patterns, glass."""
+    """(H, W) uint16 measured mm, 0 = none."""
+    return stereo_reading(hit, camera, seed=seed, sensor=sensor).depth_mm
+
+
+def stereo_reading(
+    hit: HitRecord, camera: Camera, *, seed: int, sensor: StereoSensor = D435
+) -> Reading:
+    """Measured depth, noise by seed, and reasons for holes; without untextured walls, patterns, glass."""
     # A block takes its nearest depth: objects grow by half a block.
     rng = np.random.default_rng(seed)
     size = max(round(WINDOW * hit.face.shape[1] / sensor.width_px) | 1, 3)
@@ -56,9 +64,20 @@ def stereo_depth(
     with np.errstate(divide="ignore"):
         disparity = scale / fattened + STEREO_DISPARITY_NOISE_PX * grain
         measured = scale / (np.rint(disparity * STEREO_STEPS_PER_PX) / STEREO_STEPS_PER_PX)
-    good = np.isfinite(fattened) & ~hidden & (disparity <= MAX_DISPARITY_PX)
-    good &= (measured > 0) & (measured <= sensor.farthest_m)
-    return np.where(good, np.rint(np.where(good, measured, 0) * 1000), 0).astype(np.uint16)
+    is_hit, is_near = np.isfinite(fattened), disparity > MAX_DISPARITY_PX
+    in_reach = (measured > 0) & (measured <= sensor.farthest_m)
+    faults = {
+        Hole.TOO_NEAR: is_hit & is_near,
+        Hole.TOO_FAR: ~is_hit | (~is_near & ~in_reach),
+        Hole.SHADOW: is_hit & hidden,
+    }
+
+    def measured_by_block(mask: Mask) -> Mask:
+        nearest = ndimage.minimum_filter(np.where(mask, z, np.inf), size=size, mode="nearest")
+        return np.asarray(is_hit & (nearest == fattened))
+
+    least_return = FULL_REFLECTANCE / sensor.farthest_m**2
+    return depth_reading(measured, faults, least_return, measured_by_block)
 
 
 def _hidden_from_right(z: F64, camera: Camera, baseline_m: float) -> Mask:

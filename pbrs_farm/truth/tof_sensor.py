@@ -12,6 +12,13 @@ from scipy import ndimage
 
 from pbrs_farm.core.arrays import F64, HitRecord
 from pbrs_farm.core.camera import Camera
+from pbrs_farm.truth.sensor_reading import (
+    FULL_REFLECTANCE,
+    LOW_REFLECTANCE,
+    Hole,
+    Reading,
+    depth_reading,
+)
 
 TOF_MAX_ANGLE_RAD = np.radians(85)  # from the normal; beyond it nothing returns
 _AZURE_STEADY_M: Final = 2.5  # from which an Azure Kinect is less noisy than a Kinect 2
@@ -42,20 +49,28 @@ class TofSensor:
     farthest_m: float
     noise_mm: Callable[[F64, F64], F64]
     mix_px: float  # standard deviation of what a pixel gathers light over
+    least_reflectance: float = LOW_REFLECTANCE  # of a surface at the farthest distance
     drops_edges: bool = False  # no depth where both sides of an edge reach a pixel; else their mean
 
 
 KINECT2: Final = TofSensor(0.5, 4.5, kinect2_noise_mm, 0.5)
 AZURE: Final = TofSensor(0.5, 3.86, azure_noise_mm, 0.5, drops_edges=True)
 """An Azure Kinect, narrow field of view, unbinned."""
-L515: Final = TofSensor(0.25, 9.0, l515_noise_mm, 0.3)
+L515: Final = TofSensor(0.25, 9.0, l515_noise_mm, 0.3, FULL_REFLECTANCE)
 """A lidar camera: a laser's spot is narrow."""
 
 
 def tof_depth(
     hit: HitRecord, camera: Camera, *, seed: int, sensor: TofSensor = KINECT2
 ) -> NDArray[np.uint16]:
-    """(H, W) uint16 measured mm, 0 = none, noise by seed; without multipath, dark surfaces, sun, motion."""
+    """(H, W) uint16 measured mm, 0 = none."""
+    return tof_reading(hit, camera, seed=seed, sensor=sensor).depth_mm
+
+
+def tof_reading(
+    hit: HitRecord, camera: Camera, *, seed: int, sensor: TofSensor = KINECT2
+) -> Reading:
+    """Measured depth, noise by seed, and reasons for holes; without multipath, dark surfaces, sun, motion."""
     # Gather light over each pixel's surroundings: on an edge of depth both sides mix.
     rng = np.random.default_rng(seed)
     z = hit.depth_z.astype(np.float64)
@@ -67,14 +82,15 @@ def tof_depth(
     # Add axial noise by the pixel's own distance and angle.
     noise_m = sensor.noise_mm(measured, np.minimum(angle, TOF_MAX_ANGLE_RAD)) / 1000
     measured += rng.normal(0.0, 1.0, z.shape) * noise_m
-    is_edge = _edges(z, hit.valid) if sensor.drops_edges else False
-    good = (
-        ~np.asarray(is_edge)
-        & (weight > 0)
-        & (measured >= sensor.nearest_m)
-        & (measured <= sensor.farthest_m)
-    )
-    return np.where(good, np.rint(np.where(good, measured, 0) * 1000), 0).astype(np.uint16)
+    returns = weight > 0
+    faults = {
+        Hole.TOO_NEAR: returns & (measured < sensor.nearest_m),
+        Hole.TOO_FAR: ~hit.valid | (returns & (measured > sensor.farthest_m)),
+        Hole.GRAZING: hit.valid & ~returns,
+    }
+    if sensor.drops_edges:
+        faults[Hole.EDGE] = _edges(z, hit.valid)
+    return depth_reading(measured, faults, sensor.least_reflectance / sensor.farthest_m**2)
 
 
 def _edges(z: F64, valid: NDArray[np.bool_]) -> NDArray[np.bool_]:

@@ -92,6 +92,24 @@ def exr(file: str, change: Callable[[np.ndarray], np.ndarray]) -> Plant:
     return plant
 
 
+def moved_surface(array: np.ndarray) -> np.ndarray:
+    """A patch of surfaces 3 mm farther, where there are any."""
+    out = array.copy()
+    out[40:80, 50:100] += 3 * (out[40:80, 50:100] > 0)
+    return out
+
+
+def other_surface(array: np.ndarray) -> np.ndarray:
+    """A patch of surfaces with the next id, where there are any."""
+    return np.sign(array) * (array + (np.arange(array.shape[1]) < 60))
+
+
+def exchanged_holes(array: np.ndarray) -> np.ndarray:
+    """Mirrors for clear surfaces, and slants for shadows and dark surfaces."""
+    reason = np.array([0, 2, 1, 6, 5, 4, 8, 8, 7])
+    return reason[array.astype(int)]
+
+
 def brighter_shading(view: Path) -> None:
     """Shading a tenth brighter, with a residual that compensates."""
     srgb = array_from_png((view / "albedo.png").read_bytes()) / 255
@@ -505,6 +523,15 @@ _FINISHED: dict[str, tuple[Plant, str]] = {
     ),
     "time of flight scaled": (picture("depth_sensor_tof.png", scaled(1.05)), "depth_sensor_tof: values"),
     "stereo's depth scaled": (picture("depth_sensor_stereo.png", scaled(1.02)), "depth_sensor_stereo: values"),
+    "depth of the second surface moved": (picture("depth_layers/depth.png", moved_surface), "depth layers"),
+    "class of the second surface exchanged": (picture("depth_layers/semantic.png", other_surface), "depth layers"),
+    "instance of a surface exchanged": (picture("depth_layers/instance.png", other_surface), "depth layers"),
+    "clear surfaces opaque": (picture("depth_layers/clear.png", scaled(0)), "depth layers"),
+    **{
+        f"{name}'s holes exchanged": (picture(f"depth_hole{name}.png", exchanged_holes), f"depth_hole{name}: reasons")
+        for name in ("", "_tof", "_stereo", "_d455", "_azure", "_l515")
+    },
+    "a hole hidden": (picture("depth_hole_tof.png", lambda a: np.where(a == 1, 0, a)), "depth_hole_tof: reasons"),
     "light mirrored": (picture("mlt_il_ol.png", mirrored), "light developed"),
     "light brightened": (picture("mlt_il_ol.png", scaled(1.05)), "light developed"),
     "light patched": (picture("mlt_ol.png", patch(20)), "light developed"),

@@ -13,6 +13,7 @@ from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.house import House, geometry_from_house
 from pbrs_farm.core.layers import LAYER, OPTIONAL, OWN_LAYERS
 from pbrs_farm.formats.house_bundle import bundle_from_house
+from pbrs_farm.formats.layer_file import layer_bytes
 from pbrs_farm.formats.manifest import manifest_from_markers
 from pbrs_farm.formats.marker import Marker, StoredFile
 from pbrs_farm.home.masses import weighed
@@ -38,7 +39,7 @@ def all_layers() -> tuple[str, ...]:
 def encoded(name: str, array: np.ndarray) -> bytes:
     """The bytes of a layer's file."""
     if LAYER[name].file.endswith(".png"):
-        return png_from_array(array)
+        return layer_bytes(name, array)
     names = LAYER[name].channels.split()
     planes = [array] if len(names) == 1 else list(np.moveaxis(array, -1, 0))
     return exr_from_layers({n: np.ascontiguousarray(p) for n, p in zip(names, planes, strict=True)})

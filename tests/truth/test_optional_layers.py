@@ -10,6 +10,7 @@ from pbrs_farm.core.classes import NYU13_FROM_NYU40, NYU13_NAMES, NYU40_NAMES
 from pbrs_farm.core.house import House, Material, MaterialKind, ModelPose, geometry_from_house
 from pbrs_farm.core.layers import LAYER, LAYERS
 from pbrs_farm.read.builtin.builtin_home import builtin_home
+from pbrs_farm.truth.sensor_reading import Hole
 from pbrs_farm.truth.stereo_sensor import D435, D455, stereo_depth
 from pbrs_farm.truth.tof_sensor import AZURE, KINECT2, L515, tof_depth
 from tests.inputs.label_inputs import label_inputs_of
@@ -40,8 +41,8 @@ def test_every_layer_has_the_shape_and_type_of_the_table():
         truth.OPTIONAL_NAMES, label_inputs_of(home, view)
     ).items():
         channels = LAYER[name].channels
-        n = 3 if channels in ("RGB", "X Y Z") else 1
-        assert array.shape == ((48, 64, 3) if n == 3 else (48, 64)), name
+        n = 3 if channels == "RGB" else len(channels.split())
+        assert array.shape == ((48, 64) if n == 1 else (48, 64, n)), name
         assert str(array.dtype) == LAYER[name].dtype, name
 
 
@@ -74,6 +75,8 @@ def test_a_house_without_glass_or_faces_needs_no_second_cast():
     )
     layers = truth.optional_layers(truth.OPTIONAL_NAMES, label_inputs)
     nothing = ("normal_shading", "normal_world", "behind_glass_normal", "behind_mirror_normal")
+    holes = [layers.pop(name) for name in tuple(layers) if name.startswith("depth_hole")]
+    assert all((hole == Hole.TOO_FAR).all() for hole in holes)
     assert not any(array.any() for name, array in layers.items() if name not in nothing)
     assert all((layers[name] == 32768).all() for name in nothing)
 
