@@ -21,11 +21,11 @@ from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.images import array_from_png, layers_from_exr
 
 _FAR = 65535  # mm, and more
-_FAR_IS_NOTHING = ("yolo-depth", "marigold")
+_FAR_IS_NOTHING = ("yolo-depth", "marigold", "openspatial")
 _STRUCTURE = ("wall", "floor", "ceiling", "door", "window", "otherstructure")
 _BESIDE = {
     "coco": ("form masks",), "yolo": ("form boxes",), "yolo-seg": ("form boxes",), "yolo-semantic": ("form masks",),
-    "yolo-depth": ("form depth",), "marigold": ("form depth", "form normals"), "wai": ("form depth",),
+    "yolo-depth": ("form depth",), "marigold": ("form depth", "form normals"), "wai": ("form depth",), "openspatial": ("form depth",),
     "nerfstudio": ("form depth", "form normals"),
 }  # fmt: skip
 """Form -> checks of the files that every picture has beside it."""

@@ -46,7 +46,7 @@ STEPS: Final = {
         Step("house", 1, per_view=False),
         Step("cameras", 8, ("house",), per_view=False),
         Step("pairs", 2, ("house", "cameras"), per_view=False, needs=("house", "cameras")),
-        Step("tracks", 2, ("house", "cameras"), per_view=False, needs=("house", "cameras")),
+        Step("tracks", 3, ("house", "cameras"), per_view=False, needs=("house", "cameras")),
         Step("truth", 4, ("house", "cameras")),
         Step("opengl_dl", 4, ("house", "cameras")),
         Step("opengl_il", 4, ("house", "cameras")),

@@ -18,7 +18,7 @@ from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.truth.optical_flow import inside_picture, points_of_pixels, project_points, reaches
 
-MOST_POINTS: Final = 1024
+MOST_POINTS: Final = 2048
 _QUERY_FRAMES: Final = 8  # spread over the film, in which points are chosen
 _MOVING_SHARE: Final = 0.5  # share of points on visible moving surfaces
 

@@ -4,12 +4,18 @@ from __future__ import annotations
 
 import pickle
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import numpy as np
 import pytest
+from PIL import Image
 
 import pbrs_farm as pf
 from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.export.chosen_view import ChosenView
+from pbrs_farm.formats.output_folder import views_of
+from pbrs_farm.images import array_from_png
 from pbrs_farm.run.plan import check_layers
 from pbrs_farm.run.request import Wanted
 from tests.scene.homes import small_home
@@ -68,3 +74,71 @@ def test_tracks_of_views_that_are_no_film_are_refused_before_any_output() -> Non
     with pytest.raises(pf.BadInput, match="needs a walk"):
         check_layers(want, recipe_from_name("preview"))
     check_layers(want, recipe_from_name("preview", {"cameras.source": "walk"}))
+
+
+def kubric_film(folder: Path, depth_in: str) -> tuple[dict, np.ndarray, np.ndarray, np.ndarray]:
+    """Table, pictures, planar depth and K of TAPIP3D's reader: `<name>/<name>.npy`, three digits a frame.
+
+    Stored depth is a distance between the two of depth_range, K is divided by the size.
+    """
+    table = np.load(folder / f"{folder.name}.npy", allow_pickle=True).item()
+    pictures = np.stack(
+        [np.asarray(Image.open(f)) for f in sorted((folder / "frames").glob("???.png"))]
+    )
+    files = sorted((folder / depth_in).glob("???_depth.png"))
+    values = np.stack([np.asarray(Image.open(f)) for f in files]).astype(np.float64)
+    near, far = table["depth_range"].astype(np.float64)
+    distance = near + values * (far - near) / 65535
+    k = table["intrinsics"].astype(np.float64)
+    k[:, 0] *= pictures.shape[2]
+    k[:, 1] *= pictures.shape[1]
+    v, u = np.mgrid[: pictures.shape[1], : pictures.shape[2]]
+    rays = np.stack([u + 0.5, v + 0.5, np.ones(u.shape)], -1) @ np.linalg.inv(k[0]).T
+    return table, pictures, distance / np.linalg.norm(rays, axis=-1), k
+
+
+@pytest.mark.parametrize("reader", ["cotracker", "tapip3d"])
+def test_cotracker_reads_frames_tracks_depth_and_places(
+    root: Path, tmp_path: Path, reader: str
+) -> None:
+    pf.open(root).export(tmp_path / "out", "cotracker", reader=reader)
+    (folder,) = (path for path in (tmp_path / "out").iterdir() if path.is_dir())
+    depth_in = "frames" if reader == "tapip3d" else "depth"
+    if reader == "cotracker":  # takes every file for a frame
+        assert len(list((folder / "frames").iterdir())) == 3
+    table, pictures, depth, k = kubric_film(folder, depth_in)
+    tracks = np.load(next(root.glob("houses/*/tracks.npz")))
+    views = [v for v in views_of(root) if "frame" in v.facts]
+    n = len(tracks["points"])
+    assert pictures.shape == (3, 48, 64, 3)
+    assert table["coords"].shape == (n, 3, 2)
+    np.testing.assert_allclose(table["coords"], tracks["points"], atol=1e-3)
+    # CoTracker inverts `visibility`.
+    np.testing.assert_array_equal(~table["visibility"], ~tracks["occluded"])
+    for t, view in enumerate(views):
+        stored = array_from_png((view.folder / "depth.png").read_bytes()) / 1000
+        seen = stored > 0
+        np.testing.assert_allclose(depth[t][seen], stored[seen], atol=2e-3)
+        extrinsics = np.diag([1, -1, -1, 1]) @ np.linalg.inv(table["matrix_world"][t].astype(float))
+        local = table["traj_3d"][:, t] @ extrinsics[:3, :3].T + extrinsics[:3, 3]
+        front = tracks["depth_m"][:, t] > 0
+        np.testing.assert_allclose(
+            local[front, 2], tracks["depth_m"][front, t], rtol=1e-4, atol=1e-4
+        )
+        px = local[front] @ k[t].T
+        np.testing.assert_allclose(px[:, :2] / px[:, 2:], table["coords"][front, t], atol=0.02)
+    assert (tmp_path / "out/remarks.txt").read_text().startswith("films with fewer than the 24")
+
+
+def test_a_point_behind_the_camera_has_the_place_of_the_nearest_frame() -> None:
+    from pbrs_farm.export.forms.cotracker import _places
+
+    facts = {"width_px": 4, "height_px": 4, "K": [[2, 0, 2], [0, 2, 2], [0, 0, 1]]}
+    pose = np.eye(4)
+    frames = [
+        cast(ChosenView, SimpleNamespace(facts=facts | {"world_from_camera_opencv": pose.tolist()}))
+        for _ in range(3)
+    ]
+    depth = np.array([[1, 0, 3], [0, 0, 5]], np.float32)
+    places = _places(np.full((2, 3, 2), 2.0), depth, frames)
+    np.testing.assert_allclose(places[..., 2], [[1, 1, 3], [5, 5, 5]])

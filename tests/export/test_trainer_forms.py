@@ -7,11 +7,14 @@ from __future__ import annotations
 
 import json
 import shutil
+from itertools import product
 from pathlib import Path
 
 import numpy as np
+import pandas as pd
 import pytest
 from PIL import Image
+from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SplitShares
@@ -421,3 +424,59 @@ def test_cosmos_cuts_long_films_into_windows() -> None:
         assert lengths.min() >= 61
         assert lengths.max() <= 121
     assert window_starts(10) == [0, 10]
+
+
+def openspatial_corners(box: list[float]) -> np.ndarray:
+    """(8, 3) corners: centre, full size, and angles that scipy calls "zxy"."""
+    signs = np.array(list(product((-0.5, 0.5), repeat=3)))
+    turn = Rotation.from_euler("zxy", box[6:]).as_matrix()
+    return signs * box[3:6] @ turn.T + box[:3]
+
+
+def test_openspatial_reads_rows_of_views_and_of_homes(
+    stills: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    export(stills, tmp_path / "set", "openspatial")
+    # Its engine opens paths as they are.
+    monkeypatch.chdir(tmp_path / "set")
+    rows = pd.read_parquet("singleview.parquet").to_dict("records")
+    (scene,) = pd.read_parquet("multiview.parquet").to_dict("records")
+    assert len(rows) == len(scene["image"]) == 2
+    for k, row in enumerate(rows):
+        view = of_name(stills)[Path(row["image"]).stem]
+        assert row["is_metric_depth"]
+        assert scene["pose"][k] == row["pose"]
+        np.testing.assert_array_equal(Image.open(row["image"]), stored(view, "opengl_dl"))
+        millimetres = stored(view, "depth")
+        depth = np.asarray(Image.open(row["depth_map"])).astype(float) / row["depth_scale"]
+        np.testing.assert_allclose(depth, np.where(millimetres < 65535, millimetres, 0) / 1000)
+        things = {r["id"]: r for r in view.facts["instances"] if r["nyu40"] and r["box3d"]}
+        assert len(row["obj_tags"]) == len(row["masks"]) == len(things)
+        assert [list(b) for b in scene["bboxes_2d"][k]] == [list(b) for b in row["bboxes_2d"]]
+        pose, intrinsic = np.loadtxt(row["pose"]), np.loadtxt(row["intrinsic"])
+        # The camera's height is the third coordinate.
+        opencv = np.array(view.facts["world_from_camera_opencv"])
+        assert pose[2, 3] == pytest.approx(opencv[1, 3])
+        for mask_path, box, box2d in zip(
+            row["masks"], row["bboxes_3d_world_coords"], row["bboxes_2d"], strict=True
+        ):
+            number = int(Path(mask_path).stem)
+            mask = np.asarray(Image.open(mask_path)) > 0
+            np.testing.assert_array_equal(mask, stored(view, "instance") == number)
+            y, x = np.nonzero(mask)
+            assert list(box2d) == [x.min(), y.min(), x.max(), y.max()]
+            stated = things[number]["box3d"]
+            signs = np.array(list(product((-1, 1), repeat=3)))
+            corners = signs * stated["half"] @ np.array(stated["axes"]) + stated["centre"]
+            turned = np.stack([corners[:, 0], -corners[:, 2], corners[:, 1]], 1)
+            gaps = np.linalg.norm(openspatial_corners(box)[:, None] - turned, axis=-1)
+            assert gaps.min(1).max() < 1e-6
+            # Pixels of the mask, taken into the world, are in the box.
+            z = depth[y, x]
+            local = np.stack([
+                (x - intrinsic[0, 2]) * z / intrinsic[0, 0],
+                (y - intrinsic[1, 2]) * z / intrinsic[1, 1], z, np.ones(len(z)),
+            ])  # fmt: skip
+            world = (pose @ local)[:3, z > 0].T
+            low, high = turned.min(0) - 0.01, turned.max(0) + 0.01
+            assert ((world >= low) & (world <= high)).all()

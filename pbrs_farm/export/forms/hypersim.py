@@ -146,15 +146,20 @@ def _boxes(views: Iterable[ChosenView]) -> dict[str, NDArray[Any]]:
         np.full((n, 3, 3), np.nan),
     )
     for number, box in rows.items():
-        axes = hypersim.Z_UP_FROM_Y_UP @ np.array(box["axes"], np.float64).T
-        up = int(np.abs(axes[2]).argmax())
-        order = [(up + 1) % 3, (up + 2) % 3, up]
-        upright = axes[:, order] * np.where(axes[2, up] < 0, -1.0, 1.0)
-        upright[:, 1] *= np.sign(np.linalg.det(upright)) or 1.0
-        centre[number] = hypersim.Z_UP_FROM_Y_UP @ np.array(box["centre"], np.float64)
-        size[number], turn[number] = 2 * np.array(box["half"], np.float64)[order], upright
+        centre[number], size[number], turn[number] = upright_box(box)
     name = "metadata_semantic_instance_bounding_box_object_aligned_2d"
     return {f"{name}_positions": centre, f"{name}_extents": size, f"{name}_orientations": turn}
+
+
+def upright_box(box: Mapping[str, Any]) -> tuple[F64, F64, F64]:
+    """Centre (3,), size (3,) and axes (3, 3; columns) of a box3d in the world with z up, z the most upright axis."""
+    axes = hypersim.Z_UP_FROM_Y_UP @ np.array(box["axes"], np.float64).T
+    up = int(np.abs(axes[2]).argmax())
+    order = [(up + 1) % 3, (up + 2) % 3, up]
+    upright = axes[:, order] * np.where(axes[2, up] < 0, -1.0, 1.0)
+    upright[:, 1] *= np.sign(np.linalg.det(upright)) or 1.0
+    centre = hypersim.Z_UP_FROM_Y_UP @ np.array(box["centre"], np.float64)
+    return centre, 2 * np.array(box["half"], np.float64)[order], upright
 
 
 def _parameters(scene: str, view: ChosenView) -> dict[str, Any]:

@@ -10,17 +10,18 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.form import Convention, ViewForm, name_left_out
-from pbrs_farm.export.sequences import frames_by_house, required_picture
+from pbrs_farm.export.sequences import films_of, picture_of
 from pbrs_farm.formats import tracks_npz
-from pbrs_farm.images import array_from_png
 from pbrs_farm.regular_files import fault_of, read_regular
 
 _FILE: Final = "tapvid.pkl"
 _PROTOCOL: Final = 4
+NO_FILM: Final = "pbrs-farm run HOME --cameras walk --tracks"
 
 
 def write_tapvid(views: list[ChosenView], out: Path, _choice: Choice) -> None:
@@ -30,23 +31,30 @@ def write_tapvid(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     height from its upper left corner; occluded (N, T) bool. Contains the exported frames only, and only
     points visible in at least one of them. Raises BadInput for a house without tracks.npz.
     """
-    videos: dict[str, dict[str, Any]] = {}
-    stills: list[ChosenView] = []
-    for house, moments in frames_by_house(views).items():
-        frames = [m.first for m in moments if m.first.facts.get("frame") is not None]
-        stills += [m.first for m in moments if m.first.facts.get("frame") is None]
-        stills += [view for m in moments for view in m.others.values()]
-        if frames:
-            videos[house] = _video(frames)
+    films, others = films_of(views)
+    others += [view for (_house, eye), frames in films.items() if eye for view in frames]
+    videos = {house: _video(frames) for (house, eye), frames in films.items() if not eye}
     if not videos:
-        hint = "pbrs-farm run HOME --cameras walk --tracks"
-        raise BadInput("--to", "tapvid", "no view is a frame of a sequence", hint=hint)
+        raise BadInput("--to", "tapvid", "no view is a frame of a sequence", hint=NO_FILM)
     (out / _FILE).write_bytes(pickle.dumps(videos, _PROTOCOL))
-    name_left_out(out, stills, "is not a film frame of the rig's first camera")
+    name_left_out(out, others, "is not a film frame of the rig's first camera")
 
 
 def _video(frames: list[ChosenView]) -> dict[str, Any]:
-    house = frames[0].house
+    tracks = film_tracks(frames)
+    pictures = [picture_of(frame, "tapvid") for frame in frames]
+    return {
+        "video": np.stack(pictures),
+        "points": tracks["points"].astype(np.float32),
+        "occluded": tracks["occluded"],
+    }
+
+
+def film_tracks(frames: list[ChosenView]) -> dict[str, NDArray[Any]]:
+    """Arrays of tracks.npz for these frames of a film and the points that are visible in one of them.
+
+    "points" are shares of the picture's width and height. BadInput without tracks.npz or for another film's.
+    """
     path = frames[0].entry.folder.parents[1] / tracks_npz.FILE
     try:
         data = read_regular(path)
@@ -59,19 +67,12 @@ def _video(frames: list[ChosenView]) -> dict[str, Any]:
     if unknown:
         raise BadInput(path, unknown[0], "is not a frame of these tracks")
     columns = [number[frame.id] for frame in frames]
-    pictures = [
-        array_from_png(frame.data(required_picture(frame, "tapvid")), f"{house.id}/{frame.id}")
-        for frame in frames
-    ]
+    of_frames = {name: tracks[name][:, columns] for name in ("points", "occluded", "depth_m")}
     rendered = frames[0].entry.facts
     size = np.array([rendered["width_px"], rendered["height_px"]], np.float32)
-    occluded = tracks["occluded"][:, columns]
-    is_seen = ~occluded.all(1)
-    return {
-        "video": np.stack(pictures)[..., :3],
-        "points": (tracks["points"][:, columns] / size)[is_seen].astype(np.float32),
-        "occluded": occluded[is_seen],
-    }
+    is_seen = ~of_frames["occluded"].all(1)
+    of_frames["points"] = of_frames["points"] / size
+    return {name: array[is_seen] for name, array in of_frames.items()}
 
 
 FORM = ViewForm(
