@@ -17,6 +17,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any, Final
 
 if TYPE_CHECKING:
+    from pbrs_farm.commands.streaming import stream as stream
     from pbrs_farm.core.camera import Camera as Camera
     from pbrs_farm.core.errors import BadHouse as BadHouse
     from pbrs_farm.core.errors import BadInput as BadInput
@@ -72,6 +73,7 @@ _PUBLIC: Final = {
     "open": "pbrs_farm.views.open_views:open_views",
     "render": "pbrs_farm.scene.pictures:render",
     "render_homes": "pbrs_farm.scene.pictures:render_homes",
+    "stream": "pbrs_farm.commands.streaming:stream",
 }
 
 __all__ = [
@@ -101,6 +103,7 @@ __all__ = [
     "pack",
     "render",
     "render_homes",
+    "stream",
 ]
 
 

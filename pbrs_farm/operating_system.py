@@ -297,6 +297,30 @@ def create_new(path: Path) -> int:
     return os.open(path, flags | _OF_WINDOWS, 0o666)
 
 
+LOCKS_ARE_INHERITED: Final = _POSIX
+
+
+def lock_file(path: Path, *, wait: bool = False) -> IO[bytes] | None:
+    """Lock a file until the returned one is closed or this process ends; None if another process has it.
+
+    The system releases the lock of a killed process. A child that inherits the file keeps the lock, if
+    LOCKS_ARE_INHERITED. wait: block until the lock is free.
+    """
+    path.parent.mkdir(parents=True, exist_ok=True)
+    file = path.open("ab")
+    try:
+        if _POSIX:
+            fcntl = import_module("fcntl")
+            fcntl.flock(file, fcntl.LOCK_EX | (0 if wait else fcntl.LOCK_NB))
+        else:
+            msvcrt = import_module("msvcrt")
+            msvcrt.locking(file.fileno(), msvcrt.LK_LOCK if wait else msvcrt.LK_NBLCK, 1)
+    except OSError:
+        file.close()
+        return None
+    return file
+
+
 def flush_folder(folder: Path) -> None:
     """Sync a folder's entries to disk; no effect where folders cannot be opened."""
     if not hasattr(os, "O_DIRECTORY"):

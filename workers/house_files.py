@@ -37,13 +37,14 @@ def entries_from_arguments(
     for word in words_of_homes(arguments):
         note_step(word, "read")
         for ref in variants(resolve(word, files, models=models), seeds):
-            entry = HouseEntry(
-                house_id=ref.house_id,
-                source=_source_in_store(ref).model_dump_json(),
-                sha256=ref.fingerprint,
-            )
-            entries.setdefault(ref.house_id, (entry, ref))
+            entries.setdefault(ref.house_id, (entry_of_source(ref), ref))
     return list(entries.values())
+
+
+def entry_of_source(ref: SourceRef) -> HouseEntry:
+    """The entry of a resolved home in a job."""
+    source = _source_in_store(ref).model_dump_json()
+    return HouseEntry(house_id=ref.house_id, source=source, sha256=ref.fingerprint)
 
 
 def upload(store: Store, refs: Sequence[SourceRef]) -> None:

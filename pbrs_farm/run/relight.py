@@ -14,10 +14,10 @@ from typing import Any, Final
 import numpy as np
 
 from pbrs_farm.core import keys
-from pbrs_farm.core.arrays import F32
+from pbrs_farm.core.arrays import F32, Srgb8Image
 from pbrs_farm.core.errors import BadInput, ObjectMissing
 from pbrs_farm.core.lighting import Mode
-from pbrs_farm.core.recipe import recipe_from_json
+from pbrs_farm.core.recipe import ToneFields, recipe_from_json
 from pbrs_farm.formats.layer_file import layer_bytes
 from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
 from pbrs_farm.formats.radiance_exr import RadianceExr, radiance_from_exr
@@ -67,6 +67,15 @@ def relight_layers(
         return RelightLayers(aovs, layers)
     clean = denoise_aovs(aovs)
     return RelightLayers(clean, lamp_shares(clean.indoor, _denoised_lamps(aovs, layers)))
+
+
+def picture_of_layers(
+    light: RelightLayers, tone: ToneFields, *, outdoor: Factor, lamps: Mapping[int, F32]
+) -> Srgb8Image:
+    """(H, W, 3) sRGB of mode mlt_il_ol under other factors of daylight and of each lamp, (3,)."""
+    indoor = indoor_from_lamps(light.lamps, lamps, light.aovs.outdoor.shape)
+    images = develop(replace(light.aovs, indoor=indoor), tone, denoise=False, outdoor=outdoor)
+    return images[Mode.MLT_IL_OL.value].rgb_srgb8
 
 
 def relit(

@@ -162,7 +162,8 @@ class Renderer:
     def _begin(self) -> None:
         self._ident = threading.get_ident()
 
-    def _store(self, source: SourceRef) -> MemoryStore:
+    def store_of(self, source: SourceRef) -> MemoryStore:
+        """The store with the finished steps of a home; that of the home used longest ago is dropped."""
         key = (source.house_id, source.fingerprint)
         store = self._stores.setdefault(key, MemoryStore())
         self._stores.move_to_end(key)
@@ -176,7 +177,7 @@ class Renderer:
         """Prepare a home up to the step `house`."""
         if uses_catalogue(source, recipe):
             fetch_catalogue(recipe.dress)
-        work = Work(self._store(source), recipe, source.house_id, self._houses, source)
+        work = Work(self.store_of(source), recipe, source.house_id, self._houses, source)
         self._run("house", work)
         return work
 

@@ -116,6 +116,10 @@ class StoredRoot:
         key = keys.view_key(ref.house, ref.view, LAYER[name].file)
         return layer_from_bytes(name, self._store.get(key), f"{self.url}/{key}")
 
+    def file(self, ref: ViewRef, name: str) -> bytes:
+        """The bytes of a view's file; ObjectMissing for an unknown name."""
+        return self._get(keys.view_key(ref.house, ref.view, name))
+
     def kept_by(self, run: str) -> frozenset[ViewRef]:
         key = keys.selection_key(run, "jsonl")
         try:

@@ -15,13 +15,21 @@ from tests.scene.homes import SMALL
 EXAMPLES = sorted((Path(__file__).parents[2] / "examples").glob("*.py"))
 # Run by `make test`; the others by `make test-all`.
 QUICK = ("first_picture", "floor_plan")
+NEED_TORCH = ("stream_training",)
 
 
 @pytest.mark.filterwarnings("ignore:.*is in no room")
 @pytest.mark.parametrize(
     "example",
     [
-        pytest.param(path, id=path.stem, marks=() if path.stem in QUICK else pytest.mark.slow)
+        pytest.param(
+            path,
+            id=path.stem,
+            marks=[
+                *([] if path.stem in QUICK else [pytest.mark.slow]),
+                *([pytest.mark.study] if path.stem in NEED_TORCH else []),
+            ],
+        )
         for path in EXAMPLES
     ],
 )
