@@ -55,6 +55,7 @@ READ_BACK: Final[dict[str, tuple[str, tuple[str, ...]]]] = {
     "interiorverse": ("trainer_forms", ("interiorverse",)),
     "kitti": ("sequences", ("kittis",)),
     "layoutnet": ("training_forms", ("horizonnet",)),
+    "lerobot": ("trainer_forms", ("lerobot",)),
     "lidar": ("lidar_form", ()),
     "marigold": ("training_forms", ("marigold",)),
     "moge": ("trainer_forms", ("moge",)),

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import json
 import shutil
+from io import BytesIO
 from itertools import product
 from pathlib import Path
 
@@ -480,3 +481,76 @@ def test_openspatial_reads_rows_of_views_and_of_homes(
             world = (pose @ local)[:3, z > 0].T
             low, high = turned.min(0) - 0.01, turned.max(0) + 0.01
             assert ((world >= low) & (world <= high)).all()
+
+
+def test_lerobot_reads_episodes_with_depth_k_and_poses(root: Path, tmp_path: Path) -> None:
+    export(root, tmp_path / "set", "lerobot")
+    folder = tmp_path / "set"
+    info = json.loads((folder / "meta/info.json").read_text())
+    assert (info["codebase_version"], info["fps"], info["total_frames"]) == ("v3.0", 5, 3)
+    # As `meta.tasks.iloc[index].name`.
+    tasks = pd.read_parquet(folder / "meta/tasks.parquet")
+    assert tasks.iloc[0].name == "Walk through the home."
+    episodes = pd.read_parquet(folder / "meta/episodes/chunk-000/file-000.parquet")
+    (episode,) = episodes.to_dict("records")
+    assert (episode["dataset_from_index"], episode["dataset_to_index"]) == (0, 3)
+    place = {name: episode[f"data/{name}"] for name in ("chunk_index", "file_index")}
+    rows = pd.read_parquet(folder / info["data_path"].format(**place)).to_dict("records")
+    assert set(rows[0]) == set(info["features"])
+    images = [name for name, f in info["features"].items() if f["dtype"] == "image"]
+    assert images == [
+        f"observation.images.{name}{end}" for name in ("first", "right") for end in ("", "_depth")
+    ]
+    for number, row in enumerate(rows):
+        assert (row["frame_index"], row["index"], row["episode_index"]) == (number, number, 0)
+        assert row["timestamp"] == pytest.approx(number / info["fps"])
+        for name in ("first", "right"):
+            end = "" if name == "first" else "_right"
+            view = of_name(root)[f"frame_{number:05d}{end}"]
+            image = Image.open(BytesIO(row[f"observation.images.{name}"]["bytes"]))
+            np.testing.assert_array_equal(image, stored(view, "opengl_dl"))
+            depth = Image.open(BytesIO(row[f"observation.images.{name}_depth"]["bytes"]))
+            assert (depth.format, depth.mode) == ("TIFF", "I;16")
+            millimetres = stored(view, "depth")
+            np.testing.assert_array_equal(depth, np.where(millimetres < 65535, millimetres, 0))
+            k = row[f"observation.{name}.K"].reshape(3, 3)
+            np.testing.assert_allclose(k[:2, 2], (31.5, 23.5))
+            pose = row[f"observation.{name}.pose"].astype(float)
+            matrix = np.eye(4)
+            matrix[:3, :3] = Rotation.from_quat(pose[3:]).as_matrix()
+            matrix[:3, 3] = pose[:3]
+            np.testing.assert_allclose(matrix, view.facts["world_from_camera_opencv"], atol=1e-6)
+        np.testing.assert_array_equal(row["observation.state"], row["observation.first.pose"])
+        np.testing.assert_array_equal(row["action"], rows[min(number + 1, 2)]["observation.state"])
+    stats = json.loads((folder / "meta/stats.json").read_text())
+    assert set(stats) == set(info["features"])
+    pictures = [stored(of_name(root)[f"frame_{k:05d}"], "opengl_dl") / 255 for k in range(3)]
+    of_first = stats["observation.images.first"]
+    assert np.shape(of_first["mean"]) == (3, 1, 1)
+    np.testing.assert_allclose(np.ravel(of_first["mean"]), np.mean(pictures, axis=(0, 1, 2)))
+    np.testing.assert_allclose(np.ravel(of_first["std"]), np.std(pictures, axis=(0, 1, 2)))
+    assert of_first["count"] == [3]
+
+
+@pytest.mark.study
+def test_lerobots_table_library_opens_the_episodes(root: Path, tmp_path: Path) -> None:
+    """With the features that LeRobot derives from info.json."""
+    import datasets
+
+    export(root, tmp_path / "set", "lerobot")
+    info = json.loads((tmp_path / "set/meta/info.json").read_text())
+    features = {}
+    for name, feature in info["features"].items():
+        kind = datasets.Value(dtype=feature["dtype"]) if feature["dtype"] != "image" else None
+        vector = datasets.Sequence(length=feature["shape"][0], feature=kind)
+        features[name] = datasets.Image() if kind is None else vector
+        if feature["shape"] == [1]:
+            features[name] = kind
+    files = [str(file) for file in sorted((tmp_path / "set/data").rglob("*.parquet"))]
+    rows = datasets.Dataset.from_parquet(
+        files, features=datasets.Features(features), cache_dir=str(tmp_path / "cache")
+    )
+    view = of_name(root)["frame_00001"]
+    np.testing.assert_array_equal(rows[1]["observation.images.first"], stored(view, "opengl_dl"))
+    np.testing.assert_array_equal(rows[1]["observation.images.first_depth"], stored(view, "depth"))
+    assert len(rows[1]["observation.first.K"]) == 9
