@@ -14,7 +14,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.classes import DOOR, MIRROR, OTHERFURNITURE, OTHERSTRUCTURE, REFRIGERATOR
-from pbrs_farm.core.house import Item, ItemKind, MaterialKind, Surface
+from pbrs_farm.core.house import Item, ItemKind, Material, MaterialKind, Surface
 from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.dress.box_mapping import connected_parts
 from pbrs_farm.dress.finish_scheme import FinishScheme, finish_scheme
@@ -22,13 +22,12 @@ from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.surface_finishes import (
     Finish,
-    has_plain,
     is_plain,
     item_with_finish,
     part_of_surface,
     with_finish,
 )
-from pbrs_farm.home.names import RADIATORS, words_of_item
+from pbrs_farm.home.names import RADIATORS, names_glass, words_of_item
 
 PASS: Final = "joinery"  # in reports and random streams
 _SMALL_M: Final = (
@@ -127,22 +126,32 @@ def _finish_of_railing(item: Item, scheme: FinishScheme) -> Finish:
 def _finish_opening(
     house: MutableHouse, item: Item, scheme: FinishScheme, leaf: Finish, frame: Finish
 ) -> Item:
-    """A door or window by its connected surfaces: what spans its width is frame, small ones are fittings."""
+    """A door or window by its connected surfaces: those across its width are frame, small ones fittings.
+
+    Generated ones name their fittings and joinery, of which parts may be small, and glass that is not clear.
+    """
     # Lights refer to surfaces by index, which a split would change.
-    if any(light.emitting for light in item.lights) or not has_plain(house, item):
+    takes = [_takes_finish(house.materials[s.material]) for s in item.surfaces]
+    if any(light.emitting for light in item.lights) or not any(takes):
         return item
     box = item.oriented_box
     wide = float(box.half[0] * 2)
     surfaces: list[Surface] = []
-    for surface in item.surfaces:
-        if not is_plain(house.materials[surface.material]):
+    for surface, is_taken in zip(item.surfaces, takes, strict=True):
+        if not is_taken:
             surfaces.append(surface)
             continue
+        word = house.materials[surface.material].name.rpartition("_")[2]
+        least = {"handle": np.inf, "joinery": 0.0}.get(word, _SMALL_M)
         for part, size in _connected_surfaces(surface, box.axes):
             is_frame = size[0] > _FRAME * wide and frame != leaf
-            finish = scheme.fitting if size.max() < _SMALL_M else frame if is_frame else leaf
+            finish = scheme.fitting if size.max() < least else frame if is_frame else leaf
             surfaces.append(with_finish(house, part, finish, box.axes))
     return replace(item, surfaces=tuple(_merge_surfaces(surfaces)))
+
+
+def _takes_finish(material: Material) -> bool:
+    return is_plain(material) and not names_glass(material.name)
 
 
 def _connected_surfaces(surface: Surface, axes: F64) -> Iterator[tuple[Surface, F64]]:

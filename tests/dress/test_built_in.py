@@ -75,6 +75,7 @@ def test_one_home_has_one_scheme_and_seeds_give_several() -> None:
         Material("glass", MaterialKind.PANE),
         Material("carved", texture_id="0123456789abcdef"),
         Material("etched", opacity=0.5),
+        Material("m2_satin_glass"),
     ],
 )
 def test_panes_and_pictures_of_a_door_stay(material: Material) -> None:
@@ -82,6 +83,17 @@ def test_panes_and_pictures_of_a_door_stay(material: Material) -> None:
     home = joined(source, 1)
     assert materials_of(home) == [material]
     assert home.items[0].tags == source.items[0].tags
+
+
+@pytest.mark.parametrize(
+    ("name", "n_fittings"), [("m1_handle", 3), ("m0_joinery", 0), ("paint", 1)]
+)
+def test_fittings_are_parts_so_named_or_small_ones(name: str, n_fittings: int) -> None:
+    source = replace(house(door()), materials=(Material(name),))
+    home = joined(source, 1)
+    metals = [s for s in home.items[0].surfaces if home.materials[s.material].is_metal]
+    n_faces = sum(len(s.faces) for s in metals)
+    assert n_faces == 12 * n_fittings
 
 
 @pytest.mark.parametrize(
