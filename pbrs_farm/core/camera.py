@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F32, F64, Mask, Matrix4
 from pbrs_farm.core.checked_calls import Size, Vector, checked_call
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.frames import OPENCV_FROM_OPENGL
+from pbrs_farm.core.frames import OPENCV_FROM_OPENGL, affine
 from pbrs_farm.core.lenses import PINHOLE, Lens
 from pbrs_farm.core.pinhole_faces import PinholeFaces, faces_of_directions
 from pbrs_farm.core.shot import Shot
@@ -179,12 +179,8 @@ class Camera:
         back = back / np.linalg.norm(back)
         right = np.cross(np.asarray(up, np.float64), back)
         right = right / np.linalg.norm(right)
-        world_from_camera = np.eye(4)
-        world_from_camera[:3, 0] = right
-        world_from_camera[:3, 1] = np.cross(back, right)
-        world_from_camera[:3, 2] = back
-        world_from_camera[:3, 3] = eye
-        return Camera(intrinsics, world_from_camera)
+        axes = np.stack([right, np.cross(back, right), back], axis=1)
+        return Camera(intrinsics, affine(axes, eye))
 
     @staticmethod
     @checked_call

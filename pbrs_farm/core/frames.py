@@ -7,7 +7,7 @@ World: metres, right-handed, y up. Plan coordinates are (x, z). Camera inside: O
 from __future__ import annotations
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from pbrs_farm.core.arrays import F64, Matrix4
 
@@ -20,6 +20,10 @@ OPENCV_FROM_OPENGL: Matrix4 = np.diag([1.0, -1.0, -1.0, 1.0])
 
 # Published normal axes x right, y forward, z up  <-  OpenGL camera axes (docs/spec/suncg.md section 5).
 PUBLISHED_FROM_OPENGL: F64 = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]], np.float64)
+
+
+# Our axes, y up  <-  those of a file with z up: (x, y, z) is (x, z, -y).
+Y_UP_FROM_Z_UP: Matrix4 = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 
 
 def opencv_world_from_camera(world_from_camera: Matrix4) -> Matrix4:
@@ -48,6 +52,24 @@ def rotation_z(angle_rad: float) -> F64:
 # Exact quarter turns that lay an upright item with its top along +x, or along +z.
 LYING_ALONG_X: F64 = np.array([[0.0, 1.0, 0.0], [-1.0, 0.0, 0.0], [0.0, 0.0, 1.0]])
 LYING_ALONG_Z: F64 = np.array([[1.0, 0.0, 0.0], [0.0, 0.0, -1.0], [0.0, 1.0, 0.0]])
+
+
+def rotation_of_quaternion(w: float, x: float, y: float, z: float) -> F64:
+    """(3, 3) rotation of column vectors by a unit quaternion."""
+    return np.array(
+        [
+            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
+            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
+            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
+        ]
+    )
+
+
+def affine(linear: ArrayLike, offset: ArrayLike = 0.0) -> Matrix4:
+    """(4, 4) that turns and scales by linear (3, 3), then moves by offset (3,)."""
+    matrix = np.eye(4)
+    matrix[:3, :3], matrix[:3, 3] = linear, offset
+    return matrix
 
 
 def is_flattening(matrix: F64) -> bool:

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.arrays import F64, Matrix4, triple
+from pbrs_farm.core.frames import affine
 
 Triple = tuple[float, float, float]
 
@@ -54,17 +55,14 @@ class Joint:
     def motion(self, value: float) -> Matrix4:
         """(4, 4) rigid motion of the part from its present place to that at a value, without limits."""
         by, axis = value - self.value, np.array(self.axis)
-        matrix = np.eye(4)
         if self.kind is JointKind.PRISMATIC:
-            matrix[:3, 3] = by * axis
-            return matrix
+            return affine(np.eye(3), by * axis)
         # Rodrigues' formula, about the point.
         x, y, z = axis
         cross = np.array([[0, -z, y], [z, 0, -x], [-y, x, 0]])
-        matrix[:3, :3] = np.eye(3) + np.sin(by) * cross + (1 - np.cos(by)) * (cross @ cross)
+        turn = np.eye(3) + np.sin(by) * cross + (1 - np.cos(by)) * (cross @ cross)
         point = np.array(self.point)
-        matrix[:3, 3] = point - matrix[:3, :3] @ point
-        return matrix
+        return affine(turn, point - turn @ point)
 
     def placed(self, matrix: F64) -> Joint:
         """The joint of an item moved by a matrix (4, 4), scaled along and across the axis; masses follow."""

@@ -13,6 +13,7 @@ from itertools import pairwise
 import numpy as np
 
 from pbrs_farm.core.arrays import F64, Matrix4
+from pbrs_farm.core.frames import rotation_of_quaternion
 
 JOINT_VALUES, BODY_VALUES = 1, 7
 
@@ -51,7 +52,7 @@ class Motion:
         if share > 0:
             row = _between(row, np.array(self.values[k + 1], np.float64), share)
         matrix = np.eye(4)
-        matrix[:3, :3] = _rotation(row[3:])
+        matrix[:3, :3] = rotation_of_quaternion(*row[3:])
         matrix[:3, 3] = row[:3] - matrix[:3, :3] @ np.array(self.pivot)
         return matrix
 
@@ -97,15 +98,3 @@ def _between(a: F64, b: F64, share: float) -> F64:
     else:
         turn = (1 - share) * p + share * q
     return np.concatenate([(1 - share) * a[:3] + share * b[:3], turn / np.linalg.norm(turn)])
-
-
-def _rotation(quaternion: F64) -> F64:
-    """(3, 3) of a unit quaternion w, x, y, z."""
-    w, x, y, z = quaternion
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )

@@ -13,6 +13,7 @@ import numpy as np
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import ItemKind
 from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of, opengl_normals
 from pbrs_farm.export.sequences import pose_opencv
@@ -101,7 +102,7 @@ def twin_share(view: ChosenView, other: ChosenView) -> float:
     if not len(points):
         return 0.0
     matrix = np.linalg.inv(pose_opencv(other)) @ pose_opencv(view)
-    moved = theirs.pixels(points @ matrix[:3, :3].T + matrix[:3, 3])
+    moved = theirs.pixels(transform_points(matrix, points))
     pixels = i.pixels(points)
     shift = (moved / [theirs.width_px, theirs.height_px]) - (pixels / [i.width_px, i.height_px])
     with np.errstate(invalid="ignore"):

@@ -6,12 +6,11 @@ from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Item, Surface
 from pbrs_farm.core.mesh import area_vectors, face_areas, triangle_corners
+from pbrs_farm.geometry.connected import connected_places
 
 _WELD_M = 1e-4  # vertices no farther apart are one
 _GOLDEN = 0.6180339887498949  # how far each board's picture is shifted against the one before it
@@ -83,11 +82,7 @@ def _parts_of(local: F64, faces: NDArray[np.int32]) -> Int:
     else:
         _, welded = np.unique(places, axis=0, return_inverse=True)
     welded = welded.ravel()
-    n = int(welded.max()) + 1 if len(welded) else 0
-    a, b, c = (welded[faces[:, k]] for k in range(3))
-    links = coo_array((np.ones(2 * len(faces), np.int8), (np.r_[a, b], np.r_[b, c])), shape=(n, n))
-    _, label = connected_components(links, directed=False)
-    return np.asarray(label[welded], np.int64)
+    return connected_places(welded[faces], int(welded.max(initial=-1)) + 1)[welded]
 
 
 def _extents(local: F64, part: Int) -> F64:

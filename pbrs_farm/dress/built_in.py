@@ -14,19 +14,13 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Catalogue
 from pbrs_farm.core.classes import DOOR, MIRROR, OTHERFURNITURE, OTHERSTRUCTURE, REFRIGERATOR
-from pbrs_farm.core.house import Item, ItemKind, Material, MaterialKind, Surface
+from pbrs_farm.core.house import Item, ItemKind, Material, MaterialKind, Surface, part_of
 from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.dress.box_mapping import connected_parts
 from pbrs_farm.dress.finish_scheme import FinishScheme, finish_scheme
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import Style
-from pbrs_farm.dress.surface_finishes import (
-    Finish,
-    is_plain,
-    item_with_finish,
-    part_of_surface,
-    with_finish,
-)
+from pbrs_farm.dress.surface_finishes import Finish, is_plain, item_with_finish, with_finish
 from pbrs_farm.home.names import RADIATORS, names_glass, words_of_item
 
 PASS: Final = "joinery"  # in reports and random streams
@@ -158,7 +152,7 @@ def _connected_surfaces(surface: Surface, axes: F64) -> Iterator[tuple[Surface, 
     """Each connected part of a surface, and its size along the axes (3,)."""
     part = connected_parts(surface, axes)[surface.faces[:, 0]]
     for k in range(int(part.max(initial=-1)) + 1):
-        mine = part_of_surface(surface, part == k)
+        mine = part_of(surface, surface.faces[part == k], surface.name)
         if len(mine.faces):
             yield mine, np.ptp(mine.positions.astype(np.float64) @ axes, axis=0)
 

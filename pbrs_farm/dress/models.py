@@ -10,6 +10,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece, Place, Shape
 from pbrs_farm.core.classes import OTHERPROP
+from pbrs_farm.core.frames import affine
 from pbrs_farm.core.house import Material, Surface, Texture
 from pbrs_farm.core.joints import Joint
 
@@ -53,8 +54,7 @@ def standing_piece(
         (width, depth, height),
         library="generated",
     )
-    to_base = np.eye(4)
-    to_base[:3, 3] = -base
+    to_base = affine(np.eye(3), -base)
     shape = Shape(
         moved,
         tuple(materials),

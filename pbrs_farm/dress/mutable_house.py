@@ -14,7 +14,7 @@ import numpy as np
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece, Shape
-from pbrs_farm.core.frames import rotation_y
+from pbrs_farm.core.frames import affine, rotation_y
 from pbrs_farm.core.house import Box, House, Item, LightPart, Material, Note, Surface, Texture
 from pbrs_farm.dress.painted_bank import PaintedBank
 from pbrs_farm.dress.painted_materials import PaintedMaterials
@@ -108,7 +108,7 @@ class MutableHouse:
             self._placed_surface(s, shape, moved, normal_matrix) for s in shape.surfaces
         )
         lights = tuple(_moved_light(light, moved, turn) for light in shape.lights)
-        matrix = _affine(turn * factor, at)
+        matrix = affine(turn * factor, at)
         return Item(
             id=item_id,
             name=piece.name,
@@ -199,7 +199,7 @@ def moved_item(item: Item, step: F64, turn: F64 | None = None, about: F64 | None
         return replace(s, positions=points.astype(np.float32), normals=normals)
 
     box = item.box and Box(moved(item.box.centre), item.box.half, turn @ item.box.axes)
-    matrix = _affine(turn, pivot - turn @ pivot + step)
+    matrix = affine(turn, pivot - turn @ pivot + step)
     return replace(
         item,
         surfaces=tuple(surface(s) for s in item.surfaces),
@@ -207,13 +207,6 @@ def moved_item(item: Item, step: F64, turn: F64 | None = None, about: F64 | None
         lights=tuple(_moved_light(light, moved, turn) for light in item.lights),
         joints=tuple(joint.placed(matrix) for joint in item.joints),
     )
-
-
-def _affine(linear: F64, offset: F64) -> F64:
-    """(4, 4) that turns and scales by (3, 3), then moves by (3,)."""
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = linear, offset
-    return matrix
 
 
 def _moved_light(light: LightPart, moved: Callable[[F64], F64], turn: F64) -> LightPart:

@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Item, Material, MaterialKind, Surface
 from pbrs_farm.dress.box_mapping import box_mapped
 from pbrs_farm.dress.finishes import grain_pattern
@@ -64,19 +64,6 @@ def is_plain(material: Material) -> bool:
     """Whether a finish would cover it: opaque and without a picture."""
     is_solid = material.kind is MaterialKind.OPAQUE and material.opacity == 1
     return is_solid and material.texture_id is None
-
-
-def part_of_surface(surface: Surface, faces: Bools) -> Surface:
-    """The surface with those of its faces (F,) alone, and the vertices they use."""
-    chosen = surface.faces[faces]
-    used, numbers = np.unique(chosen, return_inverse=True)
-    return replace(
-        surface,
-        positions=surface.positions[used],
-        faces=numbers.reshape(-1, 3).astype(np.int32),
-        uvs=None if surface.uvs is None else surface.uvs[used],
-        normals=None if surface.normals is None else surface.normals[used],
-    )
 
 
 def number_of_finish(house: MutableHouse, finish: Finish) -> int:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import Final
 
 import numpy as np
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64, I32
 from pbrs_farm.core.catalogue import Shape
-from pbrs_farm.core.house import Material, MaterialKind, Surface
+from pbrs_farm.core.house import Material, MaterialKind, Surface, part_of
 from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.core.mesh import face_areas
 
@@ -145,15 +145,7 @@ def _obj_lines(shape: Shape) -> Iterator[str]:
 def _visible_surface(surface: Surface) -> Surface:
     """The surface without faces that have no area once written, and without their vertices."""
     written = np.asarray(surface.positions, np.float64).round(_DECIMALS)
-    visible = surface.faces[face_areas(written[surface.faces]) > 0]
-    used, faces = np.unique(visible, return_inverse=True)
-    return replace(
-        surface,
-        positions=surface.positions[used],
-        faces=faces.reshape(-1, 3).astype(np.int32),
-        uvs=None if surface.uvs is None else surface.uvs[used],
-        normals=None if surface.normals is None else surface.normals[used],
-    )
+    return part_of(surface, surface.faces[face_areas(written[surface.faces]) > 0], surface.name)
 
 
 def material_name(shape: Shape, number: int) -> str:

@@ -6,8 +6,6 @@ from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import ConvexHull, QhullError, cKDTree
 
 from pbrs_farm.core.arrays import F64, I64, Bools
@@ -21,6 +19,7 @@ from pbrs_farm.core.mesh import (
     signed_volume,
     unit_normals,
 )
+from pbrs_farm.geometry.connected import connected_faces
 from pbrs_farm.geometry.surface_points import spread_points
 from pbrs_farm.installation import install_command
 
@@ -46,10 +45,7 @@ def connected(triangles: F64) -> list[F64]:
     """Triangles (F, 3, 3) by what hangs together: corners nearer than 0.01 mm are one."""
     points = triangles.reshape(-1, 3)
     corners = np.unique(points.round(5), axis=0, return_inverse=True)[1].reshape(-1, 3)
-    ends = np.concatenate([corners[:, [0, 1]], corners[:, [1, 2]]])
-    graph = coo_array((np.ones(len(ends)), ends.T), shape=(corners.max() + 1,) * 2)
-    _, part_of = connected_components(graph, directed=False)
-    part_of_face = part_of[corners[:, 0]]
+    part_of_face = connected_faces(corners)
     return [triangles[part_of_face == k] for k in np.unique(part_of_face)]
 
 

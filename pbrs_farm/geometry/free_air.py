@@ -13,6 +13,7 @@ import numpy as np
 import shapely
 
 from pbrs_farm.core.arrays import F64, Matrix4
+from pbrs_farm.core.frames import affine
 from pbrs_farm.core.house import Box, Item, ItemKind, Room, corners_of_surfaces
 from pbrs_farm.core.mesh import clipped_to_box, lengths, points_bounds
 from pbrs_farm.geometry.heights import highest_below
@@ -71,9 +72,7 @@ class FreeAir:
                 self._hanging.append(box)
                 sphere = [*box.centre, np.linalg.norm(box.half)]
                 self._spheres = np.concatenate([self._spheres, [sphere]])
-                matrix = np.eye(4)
-                matrix[:3, :3], matrix[:3, 3] = turn, box.centre - turn @ middle
-                return matrix
+                return affine(turn, box.centre - turn @ middle)
         return None
 
     def _is_free(self, box: Box, outline: shapely.Polygon) -> bool:

@@ -25,6 +25,7 @@ from pbrs_farm.core.house import (
     Room,
     Surface,
     corners_of_surfaces,
+    part_of,
 )
 from pbrs_farm.core.mesh import face_areas, unit_normals
 from pbrs_farm.home.names import names_clear_glass, names_mirror
@@ -178,22 +179,11 @@ def _with_glass(item: Item, faces: Bools, materials: list[Material], glass: dict
         if part.all():
             surfaces[k] = replace(surface, material=number)
             continue
-        surfaces[k] = _part(surface, ~part)
-        more.append(replace(_part(surface, part), name=f"{surface.name}_glass", material=number))
+        surfaces[k] = part_of(surface, surface.faces[~part], surface.name)
+        glass_part = part_of(surface, surface.faces[part], f"{surface.name}_glass")
+        more.append(replace(glass_part, material=number))
     # Append new surfaces, so that LightPart.emitting stays valid.
     return replace(item, surfaces=(*surfaces, *more))
-
-
-def _part(surface: Surface, faces: Bools) -> Surface:
-    # Without the vertices that only the rest uses.
-    used, numbers = np.unique(surface.faces[faces], return_inverse=True)
-    return replace(
-        surface,
-        positions=surface.positions[used],
-        faces=numbers.reshape(-1, 3).astype(np.int32),
-        uvs=None if surface.uvs is None else surface.uvs[used],
-        normals=None if surface.normals is None else surface.normals[used],
-    )
 
 
 def _as_mirror(material: Material) -> Material:

@@ -5,13 +5,12 @@ from __future__ import annotations
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from pbrs_farm.core.arrays import F32, I32, Bools
 from pbrs_farm.core.house import Box, House, Item, ItemKind, Surface, corners_of_surfaces
 from pbrs_farm.core.mesh import faces_with_area, numbered_points, triangle_corners, unit_normals
 from pbrs_farm.core.recipe import RepairFields
+from pbrs_farm.geometry.connected import connected_places
 from pbrs_farm.repair.repair_report import FacesReport, Removed
 from pbrs_farm.repair.structure.added_ceilings import with_ceilings
 from pbrs_farm.repair.structure.slivers import MIN_AREA_M2
@@ -120,7 +119,7 @@ def _in_closed_shells(positions: F32, faces: I32) -> Bools:
     edges, counts = np.unique(forward, return_counts=True)
     is_paired = np.isin(backward, edges[counts == 1]) & np.isin(forward, edges[counts == 1])
     open_corners = np.unique(corners[~is_paired.reshape(-1, 3).all(1)])
-    part = connected_components(coo_array((np.ones(len(starts)), (starts, ends)), (n, n)))[1]
+    part = connected_places(corners, n)
     return np.asarray(~np.isin(part[corners[:, 0]], part[open_corners]))
 
 

@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
 from pbrs_farm.core.camera import PAPER_HFOV_RAD, Camera, Intrinsics
 from pbrs_farm.core.checked_json import checked, exactly
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.frames import OPENCV_FROM_OPENGL
+from pbrs_farm.core.frames import OPENCV_FROM_OPENGL, Y_UP_FROM_Z_UP
 from pbrs_farm.sample.room_camera_file import cameras_from_text
 
 Vector = Annotated[tuple[float, float, float], exactly(3)]
@@ -90,7 +90,7 @@ class GivenCamera(BaseModel):
 
 
 # y up  <-  z up, the world of transforms.json without applied_transform.
-_Y_UP_FROM_Z_UP: Final = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+
 _LEAST_DETERMINANT: Final = 1e-12
 _LENSES: Final = ("PINHOLE", "SIMPLE_PINHOLE", "OPENCV")
 
@@ -141,7 +141,7 @@ class _Transforms(_Optics):
 
     def cameras(self) -> list[dict[str, object]]:
         """Each frame as a GivenCamera, in the y-up world before applied_transform."""
-        world_from_file = _Y_UP_FROM_Z_UP
+        world_from_file = Y_UP_FROM_Z_UP
         if self.applied_transform is not None:
             world_from_file = np.linalg.inv(np.vstack([self.applied_transform, [0, 0, 0, 1]]))
         return [

@@ -53,7 +53,7 @@ from pbrs_farm.core.edits import (
     rows_of_matrix,
 )
 from pbrs_farm.core.errors import BadInput, BadRecipe
-from pbrs_farm.core.frames import linear_from_srgb, rotation_y
+from pbrs_farm.core.frames import affine, linear_from_srgb, rotation_y
 from pbrs_farm.core.house import House, Item, Room
 from pbrs_farm.core.recipe import Recipe, recipe_from_name, with_settings
 from pbrs_farm.core.shown_text import did_you_mean, shown
@@ -431,9 +431,8 @@ class Home:
         ids = self._ids(items)
         bounds = np.array([item.bounds for item in self.house.items if item.id in ids])
         middle = (np.nanmin(bounds[:, 0], 0) + np.nanmax(bounds[:, 1], 0)) / 2
-        matrix = np.eye(4)
-        matrix[:3, :3] = rotation_y(math.radians(turn_deg))
-        matrix[:3, 3] = middle - matrix[:3, :3] @ middle + np.asarray(by, np.float64)
+        turn = rotation_y(math.radians(turn_deg))
+        matrix = affine(turn, middle - turn @ middle + np.asarray(by, np.float64))
         return self._edited(MoveItems(items=ids, world_from_world=rows_of_matrix(matrix)))
 
     @checked_call

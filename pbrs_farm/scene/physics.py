@@ -23,6 +23,7 @@ from pbrs_farm.assets.debian import cache_folder, write_whole
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.core.frames import affine
 from pbrs_farm.core.house import House, Item, ItemKind, corners_of_surfaces
 from pbrs_farm.core.mesh import area_vectors
 from pbrs_farm.crash_notes import note_step
@@ -215,9 +216,7 @@ def _lift(
             text = f"has no space above it for {thing.model.id}"
             raise BadInput(house.id, names, text, hint="fewer or smaller objects, more supports")
         thing.onto, centre = spot
-        thing.pose = np.eye(4)
-        thing.pose[:3, :3] = turn
-        thing.pose[:3, 3] = centre - turn @ _middle(thing.model)
+        thing.pose = affine(turn, centre - turn @ _middle(thing.model))
         balls.append((centre, radius))
 
 
@@ -296,9 +295,7 @@ def _simulate(
             break
     for k, thing in enumerate(things):
         x, y, z, qw, qx, qy, qz = state.qpos[7 * k : 7 * k + 7]
-        thing.pose = np.eye(4)
-        thing.pose[:3, :3] = Rotation.from_quat([qx, qy, qz, qw]).as_matrix()
-        thing.pose[:3, 3] = [x, y, z]
+        thing.pose = affine(Rotation.from_quat([qx, qy, qz, qw]).as_matrix(), [x, y, z])
     fast = (np.abs(state.qvel.reshape(-1, 6)) * [1, 1, 1, 0.1, 0.1, 0.1]).max(1) > 10 * _STILL
     return [int(k) for k in np.flatnonzero(fast)]
 

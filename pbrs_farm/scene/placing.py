@@ -17,7 +17,7 @@ import shapely
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.frames import rotation_y
+from pbrs_farm.core.frames import affine, rotation_y
 from pbrs_farm.core.house import House, Item, Room
 from pbrs_farm.dress.supports import Support, floor_support, supports_of_item
 from pbrs_farm.dress.worktop import LIFT_M, TopSpot, Worktop
@@ -201,10 +201,7 @@ def upright_at(model: Model, foot: F64, yaw_rad: float) -> F64:
     turn = rotation_y(yaw_rad) @ model.upright
     points = model.shape.points @ turn.T
     low, high = points.min(0), points.max(0)
-    matrix = np.eye(4)
-    matrix[:3, :3] = turn
-    matrix[:3, 3] = foot - np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
-    return matrix
+    return affine(turn, foot - np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2]))
 
 
 def _stand_on_tops(model: Model, tops: Sequence[Worktop], rng: np.random.Generator) -> F64 | None:
@@ -232,10 +229,8 @@ def _stand_on_tops(model: Model, tops: Sequence[Worktop], rng: np.random.Generat
         top.take(spot)
         turn = rotation_y(top.grid.turn_rad)
         foot = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
-        matrix = np.eye(4)
-        matrix[:3, :3] = turn @ rotation_y(yaw) @ model.upright
-        matrix[:3, 3] = top.middle(spot) - [0.0, LIFT_M, 0.0] - turn @ foot
-        return matrix
+        offset = top.middle(spot) - [0.0, LIFT_M, 0.0] - turn @ foot
+        return affine(turn @ rotation_y(yaw) @ model.upright, offset)
     return None
 
 

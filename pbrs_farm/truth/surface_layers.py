@@ -9,7 +9,7 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, F64, I32, HitRecord, UnitVectors
 from pbrs_farm.core.camera import Camera
-from pbrs_farm.core.frames import linear_from_srgb, srgb_from_linear
+from pbrs_farm.core.frames import linear_from_srgb, srgb_from_linear, transform_points
 from pbrs_farm.core.gloss import GLASS_F0, MIN_ALPHA, coat_of, mirror_reflectance
 from pbrs_farm.core.house import Geometry, House, Item, Material, MaterialKind, corners_of_surfaces
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
@@ -199,9 +199,7 @@ def nocs_label(hit: HitRecord, house: House) -> NDArray[np.uint16]:
         mask = hit.valid & (hit.item == instance)
         model_from_world = np.linalg.inv(np.array(item.pose.world_from_model))
         centre, diagonal = _model_box(item, model_from_world)
-        points = _transformed_normals(
-            hit.points.position_world[mask].astype(np.float64), model_from_world
-        )
+        points = transform_points(model_from_world, hit.points.position_world[mask])
         share = (points - centre) / diagonal + 0.5
         out[mask] = np.rint(65535 * np.clip(share, 0, 1)).astype(np.uint16)
     return out
@@ -209,15 +207,9 @@ def nocs_label(hit: HitRecord, house: House) -> NDArray[np.uint16]:
 
 def _model_box(item: Item, model_from_world: F64) -> tuple[F64, float]:
     """(3,) centre and diagonal of the item's triangles in its model's frame, metres."""
-    corners = _transformed_normals(
-        corners_of_surfaces(item.surfaces).reshape(-1, 3), model_from_world
-    )
+    corners = transform_points(model_from_world, corners_of_surfaces(item.surfaces).reshape(-1, 3))
     low, high = corners.min(0), corners.max(0)
     return (low + high) / 2, float(np.linalg.norm(high - low))
-
-
-def _transformed_normals(points: F64, matrix: F64) -> F64:
-    return np.asarray(points @ matrix[:3, :3].T + matrix[:3, 3])
 
 
 def hha_label(hit: HitRecord, camera: Camera) -> NDArray[np.uint8]:

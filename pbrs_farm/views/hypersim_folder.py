@@ -20,7 +20,12 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.camera import Intrinsics
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.frames import OPENCV_FROM_OPENGL, PUBLISHED_FROM_OPENGL, srgb_from_linear
+from pbrs_farm.core.frames import (
+    OPENCV_FROM_OPENGL,
+    PUBLISHED_FROM_OPENGL,
+    affine,
+    srgb_from_linear,
+)
 from pbrs_farm.core.house_split import SplitShares, split_of_house
 from pbrs_farm.formats import hypersim
 from pbrs_farm.images import decode_photo
@@ -233,10 +238,9 @@ class HypersimFolder:
         positions, orientations = self._poses[key]
         if frame >= len(positions) or orientations.shape != (len(positions), 3, 3):
             raise BadInput(folder, "", f"{len(positions)} poses, and a frame {frame}")
-        pose, turn = np.eye(4), hypersim.Z_UP_FROM_Y_UP.T
-        pose[:3, :3] = turn @ orientations[frame]
-        pose[:3, 3] = turn @ positions[frame] * self._metres(ref.house)
-        return np.asarray(pose @ OPENCV_FROM_OPENGL)
+        turn = hypersim.Z_UP_FROM_Y_UP.T
+        place = turn @ positions[frame] * self._metres(ref.house)
+        return np.asarray(affine(turn @ orientations[frame], place) @ OPENCV_FROM_OPENGL)
 
 
 def _row(number: int, mask: NDArray[np.bool_], class40: NDArray[Any]) -> dict[str, Any]:

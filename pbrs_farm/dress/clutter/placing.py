@@ -7,8 +7,6 @@ from dataclasses import dataclass, field, replace
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Shape
@@ -19,6 +17,7 @@ from pbrs_farm.dress.models import Model
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.worktop import TopSpot, Worktop, turned_size
+from pbrs_farm.geometry.connected import connected_places
 from pbrs_farm.home.room_use import RoomKind
 
 PASS = "clutter"
@@ -53,11 +52,7 @@ def _connected_part_of_vertices(surface: Surface) -> NDArray[np.int64]:
     """(N,) the number of the connected part of each vertex; vertices of one place are one."""
     _, place = np.unique(np.round(surface.positions, 5), axis=0, return_inverse=True)
     place = place.reshape(-1)
-    start = place[surface.faces]
-    ends = np.roll(start, -1, 1)
-    n = int(place.max()) + 1
-    links = coo_array((np.ones(start.size, np.int8), (start.ravel(), ends.ravel())), (n, n))
-    return np.asarray(connected_components(links, directed=False)[1][place], np.int64)
+    return connected_places(place[surface.faces], int(place.max()) + 1)[place]
 
 
 @dataclass(slots=True)

@@ -7,14 +7,13 @@ from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece
 from pbrs_farm.core.house import Item
 from pbrs_farm.core.mesh import edges_are_paired, points_bounds, signed_volume
 from pbrs_farm.dress.mutable_house import ADDED_TAG, MutableHouse
+from pbrs_farm.geometry.connected import connected_faces
 from pbrs_farm.geometry.surface_points import item_triangles
 from pbrs_farm.geometry.swept import Swept, swept_by_item
 
@@ -128,12 +127,7 @@ def shells_of(corners: F64) -> list[Shell]:
     faces = faces[(faces != np.roll(faces, 1, axis=1)).all(1)]
     if not len(faces):
         return []
-    # Number the parts by the vertices that triangles share.
-    n = len(vertices)
-    start, end = faces.ravel(), np.roll(faces, -1, axis=1).ravel()
-    links = coo_array((np.ones(len(start), np.int8), (start, end)), (n, n))
-    _, part = connected_components(links, directed=False)
-    of_face = part[faces[:, 0]]
+    of_face = connected_faces(faces)
     order = np.argsort(of_face, kind="stable")
     cuts = np.flatnonzero(np.diff(of_face[order])) + 1
     return [_shell(vertices, faces[rows]) for rows in np.split(order, cuts)]

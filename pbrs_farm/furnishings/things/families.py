@@ -20,6 +20,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import FAMILIES_VERSION, Catalogue, Piece, Place, Shape
 from pbrs_farm.core.classes import LAMP
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.frames import affine
 from pbrs_farm.core.house import ItemKind, LightPart, MaterialKind, Surface
 from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.core.plugins import marks_in_digest, plugins
@@ -172,8 +173,7 @@ def _sized(shape: Shape, piece: Piece) -> Shape:
     base = np.array([(low[0] + high[0]) / 2, low[1], (low[2] + high[2]) / 2])
     if piece.place is Place.WALL:
         base[2] = low[2]
-    matrix = np.eye(4)
-    matrix[:3, :3], matrix[:3, 3] = np.diag(scale), -scale * base
+    matrix = affine(np.diag(scale), -scale * base)
     return replace(
         shape,
         surfaces=tuple(_scaled(s, scale, base) for s in shape.surfaces),

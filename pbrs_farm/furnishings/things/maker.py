@@ -35,6 +35,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import OTHERPROP
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.frames import affine
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.dress.models import Model, Part, hanging_piece, standing_piece, transformed
@@ -199,9 +200,7 @@ class Maker(Shapes):
         inner, self._parts = self._parts, outer
         for solid, own_material in inner:
             self.add(solid, of=own_material, at=at, turn=turn)
-        matrix = np.eye(4)
-        matrix[:3, :3] = np.eye(3) if turn is None else turn
-        matrix[:3, 3] = at or (0.0, 0.0, 0.0)
+        matrix = affine(np.eye(3) if turn is None else turn, at or (0.0, 0.0, 0.0))
         self._joints = [*outer_joints, *(joint.placed(matrix) for joint in self._joints)]
 
     @contextmanager

@@ -23,6 +23,7 @@ from shapely.ops import unary_union
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.checked_json import Finite, checked
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.frames import transform_points
 from pbrs_farm.generate.plans.closed_rings import Line, closed_rings, passages_between
 from pbrs_farm.generate.plans.parsed_plan import (
     LeftOut,
@@ -191,7 +192,7 @@ def _upper_edge_of(surface: _Surface, pose: F64) -> WallTop:
     if outline is not None:
         outline_edge = upper_edge(outline)
         edge = outline_edge if len(outline_edge) >= 2 else edge
-    world = np.array([(x, y, 0.0) for x, y in edge]) @ pose[:3, :3].T + pose[:3, 3]
+    world = transform_points(pose, np.array([(x, y, 0.0) for x, y in edge]))
     places = tuple((float(x), float(z)) for x, _, z in world)
     return WallTop(places, tuple(float(y) for y in world[:, 1]))
 
@@ -227,7 +228,7 @@ def _floor_height(path: Path, scan: _Scan, walls: list[tuple[_Surface, F64]]) ->
 def _outline_of_floor(path: Path, place: str, floor: _Surface) -> Polygon:
     pose = _parse_pose(path, place, floor)
     local = np.array([(*c, 0.0, 0.0, 0.0)[:3] for c in floor.polygonCorners or ()])
-    world = local @ pose[:3, :3].T + pose[:3, 3]
+    world = transform_points(pose, local)
     return Polygon(world[:, [0, 2]])
 
 

@@ -14,7 +14,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Place, Shape
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.frames import rotation_y
+from pbrs_farm.core.frames import rotation_y, transform_points
 from pbrs_farm.core.house import Surface, Texture
 from pbrs_farm.read.catalogue.library_files import Entry, LibraryNotes
 from pbrs_farm.read.catalogue.lighter_shapes import lighter_shape
@@ -74,7 +74,7 @@ def library_shape(
             continue
         if painted.emits:
             emitting.append(len(surfaces))
-        local = mesh.positions @ matrix[:3, :3].T + matrix[:3, 3]
+        local = transform_points(matrix, mesh.positions)
         surfaces.append(placed_surface(mesh, painted, frame, local, matrix))
     if not surfaces:
         notes.add("empty-model", entry.id, "nothing to see in it")

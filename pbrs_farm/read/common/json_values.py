@@ -21,7 +21,7 @@ from pydantic import (
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.checked_json import Finite, exactly
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.frames import is_flattening
+from pbrs_farm.core.frames import affine, is_flattening
 
 # Valid names of models and textures: file names that stay in their folder.
 NAME: Final = re.compile(r"[A-Za-z0-9_][A-Za-z0-9_.\-]{0,99}")
@@ -49,7 +49,7 @@ def _parse_hex_colour(value: Any) -> Any:
     return tuple(int(value[k : k + 2], 16) / 255 for k in (1, 3, 5))
 
 
-def affine(column_major: F64) -> F64:
+def affine_of_columns(column_major: F64) -> F64:
     m = column_major.reshape(4, 4).T
     if (np.abs(m[3] - _LAST_ROW) > 1e-6 + 1e-5 * _LAST_ROW).any():
         raise ValueError("is not affine (column-major)")
@@ -95,6 +95,4 @@ class Axes(Given):
             raise BadHouse(file, "up, front", "are not two directions at right angles")
         up, front = self.up / np.linalg.norm(self.up), self.front / np.linalg.norm(self.front)
         # Make the third axis of the two, so that the frame is right-handed.
-        world_from_house = np.eye(4)
-        world_from_house[:3, :3] = self.scale * np.array([np.cross(up, front), up, front])
-        return world_from_house
+        return affine(self.scale * np.array([np.cross(up, front), up, front]))

@@ -12,13 +12,12 @@ from dataclasses import replace
 from typing import Final
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from pbrs_farm.core.arrays import F64, I64, Bools
 from pbrs_farm.core.classes import CEILING, FLOOR, WALL
 from pbrs_farm.core.house import Item, ItemKind, Surface, corners_of_surfaces, part_of
 from pbrs_farm.core.mesh import area_vectors, closed_edge_share, face_areas, signed_volume
+from pbrs_farm.geometry.connected import connected_faces
 
 MAX_PLANES: Final = 200  # A wall of more planes is sculpted, not built of sheets, and stays whole
 
@@ -117,11 +116,7 @@ def components(corners: F64) -> I64:
     """(F,) number of the connected mesh of each face; corners (F, 3, 3) within _WELD_M are one."""
     keys = np.rint(corners.reshape(-1, 3) / _WELD_M)
     _, place = np.unique(keys, axis=0, return_inverse=True)
-    faces = place.reshape(-1, 3)
-    rows, columns = faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
-    n = int(faces.max()) + 1
-    graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(n, n))
-    label = connected_components(graph, directed=False)[1][faces[:, 0]]
+    label = connected_faces(place.reshape(-1, 3))
     return np.asarray(np.unique(label, return_inverse=True)[1], np.int64)
 
 

@@ -11,6 +11,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64, I32
 from pbrs_farm.core.checked_json import checked
 from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.frames import affine, rotation_of_quaternion
 from pbrs_farm.read.common.bounded_json import bounded_json
 from pbrs_farm.read.common.notes import Notes
 
@@ -236,9 +237,8 @@ def _parse_front_pieces(
         if length < 1e-6 or np.abs(scale).min() < 0.01 or np.abs(scale).max() > 10:
             n_flat += 1
             continue
-        world = np.eye(4)
-        world[:3, :3] = _rotation(turn / length) * scale
-        world[:3, 3] = location
+        x, y, z, w = turn / length
+        world = affine(rotation_of_quaternion(w, x, y, z) * scale, location)
         pieces.append(
             FrontPiece(
                 ref,
@@ -260,18 +260,6 @@ def _parse_front_pieces(
         if n:
             notes.add("missing-piece", "scene.room", f"{n} children {why}: left out")
     return tuple(pieces), places
-
-
-def _rotation(q: F64) -> F64:
-    """(3, 3) of a unit quaternion x, y, z, w."""
-    x, y, z, w = q
-    return np.array(
-        [
-            [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-            [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-            [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-        ]
-    )
 
 
 def _size_of_entry(entry: dict[str, Any]) -> tuple[float, float, float] | None:

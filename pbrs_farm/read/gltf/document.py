@@ -16,6 +16,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F64, I32, I64
 from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.frames import affine, rotation_of_quaternion
 from pbrs_farm.formats.glb import Gltf, accessor_array, entry, gltf_from_glb, view_bytes
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.gltf.compressed import draco_arrays
@@ -268,15 +269,10 @@ def parent_from_node(gltf: Gltf, node: dict[str, Any], index: int) -> F64:
     if not 0.5 < length < 2:
         raise BadHouse(gltf.file, f"{place}.rotation", "is not a unit quaternion")
     x, y, z, w = x / length, y / length, z / length, w / length
-    m = np.eye(4)
-    m[:3, :3] = [
-        [1 - 2 * (y * y + z * z), 2 * (x * y - z * w), 2 * (x * z + y * w)],
-        [2 * (x * y + z * w), 1 - 2 * (x * x + z * z), 2 * (y * z - x * w)],
-        [2 * (x * z - y * w), 2 * (y * z + x * w), 1 - 2 * (x * x + y * y)],
-    ]
-    m[:3, :3] *= numbers(gltf, node.get("scale", [1, 1, 1]), 3, f"{place}.scale")
-    m[:3, 3] = numbers(gltf, node.get("translation", [0, 0, 0]), 3, f"{place}.translation")
-    return m
+    turn = rotation_of_quaternion(w, x, y, z)
+    scale = numbers(gltf, node.get("scale", [1, 1, 1]), 3, f"{place}.scale")
+    moved = numbers(gltf, node.get("translation", [0, 0, 0]), 3, f"{place}.translation")
+    return affine(turn * scale, moved)
 
 
 def numbers(gltf: Gltf, value: Any, n: int, place: str) -> F64:

@@ -18,7 +18,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.frames import transform_points
+from pbrs_farm.core.frames import affine, transform_points
 from pbrs_farm.core.house import House, Source
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import Gltf
@@ -326,10 +326,7 @@ def _matrix_of_instance(row: dict[str, Any], place: str, file: str) -> F64:
         raise BadHouse(file, f"{place}.rotation", "is not a unit quaternion")
     (size,) = numbers(where, [row.get("uniform_scale", 1.0)], 1, f"{place}.uniform_scale")
     sizes = numbers(where, row.get("non_uniform_scale", [1, 1, 1]), 3, f"{place}.non_uniform_scale")
-    matrix = np.eye(4)
-    matrix[:3, :3] = Rotation.from_quat([x, y, z, w]).as_matrix() * (size * sizes)
-    matrix[:3, 3] = moved
-    return matrix
+    return affine(Rotation.from_quat([x, y, z, w]).as_matrix() * (size * sizes), moved)
 
 
 def _add_articulated(
@@ -454,9 +451,7 @@ def _upright_matrix(row: dict[str, Any], gltf: Gltf, config: str) -> F64:
     up, back = up / lengths[0], -front / lengths[1]
     scale = numbers(where, row.get("scale", [1, 1, 1]), 3, "scale")
     (unit,) = numbers(where, [row.get("units_to_meters", 1.0)], 1, "units_to_meters")
-    matrix = np.eye(4)
-    matrix[:3, :3] = np.stack([np.cross(up, back), up, back]) * (scale * unit)
-    return matrix
+    return affine(np.stack([np.cross(up, back), up, back]) * (scale * unit))
 
 
 def _rooms_of_regions(dataset: _Dataset, named: Any, stem: str) -> bytes | None:

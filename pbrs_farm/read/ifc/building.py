@@ -15,6 +15,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import CEILING, DOOR, FLOOR, LAMP, OTHERPROP, WALL, WINDOW
 from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.frames import Y_UP_FROM_Z_UP, transform_points
 from pbrs_farm.core.house import (
     Box,
     House,
@@ -58,7 +59,6 @@ from pbrs_farm.read.ifc.meshes import ProductMesh, Style, Whole, meshes_of_produ
 from pbrs_farm.read.ifc.model_file import model_of
 from pbrs_farm.read.mesh.obj import Mesh
 
-Y_UP: Final = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 """(x, y, z) with z up -> (x, z, -y) with y up."""
 _FAR_M: Final = 1000.0  # from the origin: coordinates of a national grid
 _CLEAR: Final = 0.3  # transparency of glass in a window
@@ -107,7 +107,7 @@ class _Building:
         self._model = model_of(path)
         self._metres = float(calculate_unit_scale(self._model))  # of a length of the file
         self._meshes: dict[int, ProductMesh] = {}
-        self._world = Y_UP.copy()
+        self._world = Y_UP_FROM_Z_UP.copy()
 
     def house(self) -> House:
         """The House of the whole building."""
@@ -180,7 +180,7 @@ class _Building:
         if np.abs(middle).max() <= _FAR_M:
             return
         shift = np.floor(middle)
-        self._world = Y_UP @ np.array(
+        self._world = Y_UP_FROM_Z_UP @ np.array(
             [[1, 0, 0, -shift[0]], [0, 1, 0, -shift[1]], [0, 0, 1, -shift[2]], [0, 0, 0, 1.0]]
         )
         text = "moved to the origin from {:.0f}, {:.0f}, {:.0f}".format(*shift)
@@ -405,7 +405,7 @@ class _Building:
     def _room(self, space: _Space) -> tuple[Room, F64] | None:
         row, mesh = space.row, space.mesh
         world = self._world @ mesh.world_from_product
-        points = (mesh.positions @ world[:3, :3].T + world[:3, 3]).astype(np.float32)
+        points = transform_points(world, mesh.positions).astype(np.float32)
         low, high = float(points[:, 1].min()), float(points[:, 1].max())
         name = str(row.LongName or row.Name or "")[:60]
         place = f"#{row.id()} {name}".strip()

@@ -9,6 +9,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.classes import DOOR, WINDOW
+from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import Item, ItemKind, Opening
 from pbrs_farm.home.names import words_of
 from pbrs_farm.read.common.doors_and_windows import Hole
@@ -97,7 +98,7 @@ def voids_of_walls(
             continue
         if not fillings and getattr(opening, "PredefinedType", None) == "RECESS":
             continue
-        points = mesh.world @ world[:3, :3].T + world[:3, 3]
+        points = transform_points(world, mesh.world)
         if fillings:
             inside = [items[f.GlobalId] for f in fillings if f.GlobalId in items]
         else:

@@ -11,6 +11,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.mesh import closed_edge_share, signed_volume
 from pbrs_farm.core.recipe import ReadFields
 
@@ -43,8 +44,7 @@ class ProductMesh:
     @property
     def world(self) -> F64:
         """(V, 3) corners in the world, z up."""
-        m = self.world_from_product
-        return np.asarray(self.positions @ m[:3, :3].T + m[:3, 3])
+        return transform_points(self.world_from_product, self.positions)
 
 
 def meshes_of_products(
@@ -102,7 +102,7 @@ def with_wholes(
         if not parts:
             continue
         own_from_world = np.linalg.inv(whole.world_from_product)
-        positions = [p.world @ own_from_world[:3, :3].T + own_from_world[:3, 3] for p in parts]
+        positions = [transform_points(own_from_world, p.world) for p in parts]
         points = np.cumsum([0, *(len(p.positions) for p in parts)])
         styles = np.cumsum([0, *(len(p.styles) for p in parts)])
         united[number] = ProductMesh(

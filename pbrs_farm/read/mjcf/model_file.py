@@ -14,6 +14,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.frames import Y_UP_FROM_Z_UP, affine
 from pbrs_farm.core.house import House, Source
 from pbrs_farm.core.joints import JointKind
 from pbrs_farm.core.recipe import ReadFields
@@ -45,7 +46,7 @@ _KINDS: Final = {
     mujoco.mjtJoint.mjJNT_HINGE: JointKind.REVOLUTE,
     mujoco.mjtJoint.mjJNT_SLIDE: JointKind.PRISMATIC,
 }
-_Y_UP: Final = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+
 _FLAT_M: Final = 0.02  # maximum height of a room's floor geom, metres
 _LEAST_ROOM_M: Final = 2.0  # minimum size of a room; a smaller body with a room's name is an item, such as a kitchen unit
 _MOST_JSON_BYTES: Final = 16 * 2**20
@@ -118,7 +119,8 @@ class _Scene:
         self._model, self._data, self._file = model, data, file
         self._notes, self._fields = notes, fields
         self._writer = GlbWriter()
-        self._nodes: list[_Row] = [{"name": "", "matrix": _Y_UP.T.ravel().tolist(), "children": []}]
+        turn = Y_UP_FROM_Z_UP.T.ravel().tolist()
+        self._nodes: list[_Row] = [{"name": "", "matrix": turn, "children": []}]
         self._meshes: list[_Row] = []
         self._materials: list[_Row] = []
         self._textures: dict[int, int] = {}  # of the model -> of the document
@@ -268,9 +270,7 @@ class _Scene:
         return None
 
     def _geom_node(self, geom: int) -> _Row:
-        matrix = np.eye(4)
-        matrix[:3, :3] = self._data.geom_xmat[geom].reshape(3, 3)
-        matrix[:3, 3] = self._data.geom_xpos[geom]
+        matrix = affine(self._data.geom_xmat[geom].reshape(3, 3), self._data.geom_xpos[geom])
         if is_endless(self._model, geom):
             matrix[:2, 3] = ((self._low + self._high) / 2)[:2]
         node: _Row = {"name": "", "matrix": matrix.T.ravel().tolist()}

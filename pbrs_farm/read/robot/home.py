@@ -10,7 +10,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.frames import transform_points
+from pbrs_farm.core.frames import Y_UP_FROM_Z_UP, transform_points
 from pbrs_farm.core.house import House, ItemKind, Source
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.format import GivenFile, root_of
@@ -33,7 +33,6 @@ from pbrs_farm.read.robot.links import (
 from pbrs_farm.read.robot.sdf import SdfModel, models_of_sdf
 from pbrs_farm.read.robot.urdf import GREY, MAX_BYTES, Link, Robot, Solid, Visual, robot_from_urdf
 
-_Y_UP: Final = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
 _MODELS: Final = (".glb", ".gltf", ".obj", ".stl")
 _GROUND_M: Final = 0.1  # thickness of the floor made of a plane
 _MOST_JSON_BYTES: Final = 16 * 2**20
@@ -197,7 +196,7 @@ class _Scene:
         return roots_of
 
     def _turned(self, roots: list[int], world_from_model: F64) -> int:
-        matrix = _Y_UP @ world_from_model
+        matrix = Y_UP_FROM_Z_UP @ world_from_model
         nodes = self.built.document["nodes"]
         nodes.append({"name": "", "matrix": matrix.T.ravel().tolist(), "children": roots})
         return len(nodes) - 1

@@ -14,6 +14,7 @@ from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.frames import affine
 from pbrs_farm.core.joints import JointKind
 from pbrs_farm.read.common.notes import Notes
 
@@ -250,14 +251,13 @@ def solid_of(visual: Element, rgba: F64, file: str, place: str) -> Solid | None:
 
 
 def _origin(row: Element, file: str, place: str) -> F64:
-    matrix, origin = np.eye(4), row.find("origin")
-    if origin is not None:
-        zero = (0.0, 0.0, 0.0)
-        # Roll about x, then pitch about y, then yaw about z, of fixed axes.
-        rpy = numbers_of(origin.get("rpy"), zero, file, place)
-        matrix[:3, :3] = Rotation.from_euler("xyz", rpy).as_matrix()
-        matrix[:3, 3] = numbers_of(origin.get("xyz"), zero, file, place)
-    return matrix
+    origin, zero = row.find("origin"), (0.0, 0.0, 0.0)
+    if origin is None:
+        return np.eye(4)
+    # Roll about x, then pitch about y, then yaw about z, of fixed axes.
+    rpy = numbers_of(origin.get("rpy"), zero, file, place)
+    xyz = numbers_of(origin.get("xyz"), zero, file, place)
+    return affine(Rotation.from_euler("xyz", rpy).as_matrix(), xyz)
 
 
 def numbers_of(text: str | None, default: tuple[float, ...], file: str, place: str) -> F64:

@@ -18,7 +18,14 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.read.common.arch_elements import Element, element_of
 from pbrs_farm.read.common.bounded_json import bounded_json
-from pbrs_farm.read.common.json_values import Axes, Given, Label, Lenient, affine, number_array
+from pbrs_farm.read.common.json_values import (
+    Axes,
+    Given,
+    Label,
+    Lenient,
+    affine_of_columns,
+    number_array,
+)
 from pbrs_farm.read.common.model_materials import ModelMaterials
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.root_folder import RootFolder
@@ -51,7 +58,7 @@ class AssetTransform(Given):
 
 
 class _Matrix(Given):
-    data: Annotated[F64, number_array(16, affine)]
+    data: Annotated[F64, number_array(16, affine_of_columns)]
 
 
 class _Object(Given):

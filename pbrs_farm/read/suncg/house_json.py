@@ -22,7 +22,7 @@ from pbrs_farm.read.common.json_values import (
     Number,
     Overrides,
     Vector,
-    affine,
+    affine_of_columns,
     number_array,
 )
 
@@ -67,7 +67,9 @@ class Node(Given):
     index: int  # its position in the level
     model_id: FileName = Field("", alias="modelId")
     # (4, 4), identity for rooms and grounds
-    house_from_model: Annotated[F64, number_array(16, affine)] = Field(np.eye(4), alias="transform")
+    house_from_model: Annotated[F64, number_array(16, affine_of_columns)] = Field(
+        np.eye(4), alias="transform"
+    )
     bbox: Annotated[Bounds | None, BeforeValidator(_bounds)] = None
     overrides: Overrides = Field((), alias="materials")  # by position in the model's MTL
     # Of a door or curtain, 0 = as modelled.

@@ -6,13 +6,12 @@ from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from pbrs_farm.core.arrays import F64, triple
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import LightPart, Surface, part_of
 from pbrs_farm.core.lighting import BULB_RADIUS_M, PowerUnit
+from pbrs_farm.geometry.connected import connected_faces
 
 # Power of a lamp that has bulbs but no row in suncgModelLights.json; shared by its bulbs.
 ASSUMED_WATT = 60.0
@@ -38,14 +37,7 @@ def separate_bulbs(bulb: Surface) -> tuple[Surface, ...]:
     """The connected parts of a bulb material's surface, one per bulb."""
     # Weld equal positions, then find the connected parts of the faces.
     _, same = np.unique(bulb.positions, axis=0, return_inverse=True)
-    faces = same.reshape(-1)[bulb.faces]
-    n = len(bulb.positions)
-    links = coo_array(
-        (np.ones(2 * len(faces)), (np.tile(faces[:, 0], 2), faces[:, 1:].T.reshape(-1))),
-        shape=(n, n),
-    )
-    _, part_of_vertex = connected_components(links, directed=False)
-    part_of_face = part_of_vertex[faces[:, 0]]
+    part_of_face = connected_faces(same.reshape(-1)[bulb.faces])
     parts = np.unique(part_of_face)
     if len(parts) == 1:
         return (bulb,)

@@ -11,6 +11,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import MIRROR, NYU40_NAMES, OTHERPROP
+from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import Item, ItemKind, LightPart, Material, MaterialKind, Surface
 from pbrs_farm.home.names import words_of
 from pbrs_farm.read.common.arch_elements import Arch
@@ -221,7 +222,7 @@ def _box_face(half: F64, axis: int, sign: int, world_from_box: F64, index: int) 
     outward = np.cross(np.eye(3)[a], np.eye(3)[b])[axis] * sign > 0
     is_mirrored = np.linalg.det(world_from_box[:3, :3]) < 0
     faces = np.array([[0, 1, 2], [0, 2, 3]], np.int32)
-    world = corners @ world_from_box[:3, :3].T + world_from_box[:3, 3]
+    world = transform_points(world_from_box, corners)
     return Surface(
         name=f"{'-+'[sign > 0]}{'xyz'[axis]}",
         positions=world.astype(np.float32),

@@ -14,7 +14,7 @@ import numpy as np
 import shapely
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.frames import rotation_y, transform_points
+from pbrs_farm.core.frames import affine, rotation_y, transform_points
 from pbrs_farm.core.house import Box, Item, ItemKind
 from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.read.mesh.obj import Mesh
@@ -70,7 +70,7 @@ def shut_leaves(
         for word in mesh.group.split():
             joint = joint_of(word)
             if joint.startswith("hinge_") and len(mesh.positions):
-                points = mesh.positions @ matrix[:3, :3].T + matrix[:3, 3]
+                points = transform_points(matrix, mesh.positions)
                 kind = hinges if word.startswith(HINGE) else leaves
                 kind.setdefault(joint, []).append(points)
                 break
@@ -106,7 +106,7 @@ def _find_leaf(joint: str, parts: list[F64], hinge_parts: list[F64]) -> Leaf | N
 
 def _fills_its_hole(meshes: Iterable[Mesh], matrix: F64) -> bool:
     """True if a triangle covers the centre of a door; otherwise it is only a frame."""
-    corners = [m.positions[m.faces] @ matrix[:3, :3].T + matrix[:3, 3] for m in meshes]
+    corners = [transform_points(matrix, m.positions[m.faces]) for m in meshes]
     a, b, c = np.moveaxis(np.concatenate(corners)[:, :, :2] - _OFF_MIDDLE_M, 1, 0)
     # A place beside the middle, where diagonals meet, is on the same side of all three edges.
     sides = [p[:, 0] * (q - p)[:, 1] - p[:, 1] * (q - p)[:, 0] for p, q in ((a, b), (b, c), (c, a))]
@@ -124,11 +124,9 @@ def joins_rooms(frame: PieceFrame, level_id: str, rooms: Sequence[ReadRoom]) -> 
 
 def swung(leaf: Leaf, angle_deg: float) -> F64:
     """(4, 4) that turns a leaf about its hinge, in the piece's frame."""
-    turn = np.eye(4)
-    turn[:3, :3] = rotation_y(np.radians(angle_deg) * leaf.turn)
+    turn = rotation_y(np.radians(angle_deg) * leaf.turn)
     axis = np.array([leaf.hinge[0], 0.0, leaf.hinge[1]])
-    turn[:3, 3] = axis - turn[:3, :3] @ axis
-    return turn
+    return affine(turn, axis - turn @ axis)
 
 
 def opening_angle(
@@ -145,7 +143,7 @@ def opening_angle(
     solid = shapely.union_all([w.polygon for w in walls if w.high > low and w.low < high])
     for angle in ANGLES_DEG:
         turn = swung(leaf, angle)
-        points = frame.world(leaf.points @ turn[:3, :3].T + turn[:3, 3])
+        points = frame.world(transform_points(turn, leaf.points))
         plan = shapely.MultiPoint(points[:, [0, 2]]).convex_hull
         if plan.area < _SHEET_M2:
             plan = plan.buffer(_SHEET_M)

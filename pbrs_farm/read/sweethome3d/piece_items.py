@@ -8,6 +8,7 @@ import numpy as np
 import shapely
 
 from pbrs_farm.core.classes import DOOR, LAMP, OTHERPROP, WINDOW
+from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import Item, MaterialKind, Opening
 from pbrs_farm.read.common.furniture_classes import (
     CLASS_TAG,
@@ -48,7 +49,7 @@ def piece_item(
         return None
     # Fit the model into the piece's box, then place the box in the house.
     matrix = local_from_model(piece, model)
-    points = [m.positions @ matrix[:3, :3].T + matrix[:3, 3] for m in model.meshes]
+    points = [transform_points(matrix, m.positions) for m in model.meshes]
     frame = frame_of(piece, level, np.concatenate(points) if points else None)
     # Keep the meshes that the home shows, with their materials.
     paint = [piece_material(piece, mesh, model, materials) for mesh in model.meshes]

@@ -14,7 +14,7 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.arrays import F64, triple
-from pbrs_farm.core.frames import transform_points
+from pbrs_farm.core.frames import affine, transform_points
 from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.core.mesh import face_areas
 from pbrs_farm.read.mesh.obj import Mesh
@@ -40,8 +40,7 @@ def piece_joints(
     meshes: of its model as the file has them, nothing moved. matrix: (4, 4) from the model's frame to
     the piece's. A joint's value is what the home's transformations moved it by.
     """
-    to_world = np.eye(4)
-    to_world[:3, :3], to_world[:3, 3] = frame.axes, frame.origin
+    to_world = affine(frame.axes, frame.origin)
     moves: Mapping[str, tuple[float, ...]] = {joint_of(n): m for n, m in piece.transformations}
     if piece.joints:
         read_joints = {

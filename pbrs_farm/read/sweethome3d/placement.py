@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbrs_farm.core.arrays import F64, triple
-from pbrs_farm.core.frames import linear_from_srgb, rotation_y
+from pbrs_farm.core.frames import affine, linear_from_srgb, rotation_x, rotation_y, rotation_z
 from pbrs_farm.core.house import Box, LightPart, Surface
 from pbrs_farm.core.lighting import BULB_RADIUS_M, PowerUnit
 from pbrs_farm.core.mesh import cross_products
@@ -49,7 +49,7 @@ def frame_of(piece: PlanPiece, level: PlanLevel, local_height: F64 | None = None
     width, depth, height = piece.size
     half = np.array([width, height, depth]) / 2
     # Pitch, then roll, then turn about the vertical; the program's angles run clockwise.
-    tilt = _rotation_z(-piece.roll) @ _rotation_x(-piece.pitch)
+    tilt = rotation_z(-piece.roll) @ rotation_x(-piece.pitch)
     axes = rotation_y(-piece.angle) @ tilt
     in_plan, offset = height, np.zeros(3)
     if piece.pitch or piece.roll:
@@ -81,10 +81,8 @@ def local_from_model(piece: PlanPiece, model: PieceModel) -> F64:
     size = np.array([width, height, depth])
     scale = np.where(extent > _FLAT, size / np.maximum(extent, _FLAT), 1)
     scale[0] *= -1.0 if piece.is_mirrored else 1.0
-    matrix = np.eye(4)
-    matrix[:3, :3] = scale[:, None] * turn
-    matrix[:3, 3] = -matrix[:3, :3] @ centre - scale * (low + high) / 2
-    return matrix
+    linear = scale[:, None] * turn
+    return affine(linear, -linear @ centre - scale * (low + high) / 2)
 
 
 def placed_surface(
@@ -129,16 +127,6 @@ def _projected(local: F64, normals: F64, half: F64, picture: PlanPicture) -> F64
         up = up / np.where(axis == 1, spans[2], spans[1])
         return np.stack([right, up], -1)
     return picture_uvs(np.stack([right, up], -1), picture)
-
-
-def _rotation_x(angle: float) -> F64:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[1.0, 0, 0], [0, c, -s], [0, s, c]])
-
-
-def _rotation_z(angle: float) -> F64:
-    c, s = np.cos(angle), np.sin(angle)
-    return np.array([[c, -s, 0.0], [s, c, 0], [0, 0, 1]])
 
 
 def light_parts(

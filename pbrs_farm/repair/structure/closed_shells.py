@@ -8,8 +8,6 @@ from itertools import pairwise
 
 import numpy as np
 from manifold3d import Manifold
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.house import Item, Surface
@@ -21,6 +19,7 @@ from pbrs_farm.core.mesh import (
     triangle_corners,
     unit_normals,
 )
+from pbrs_farm.geometry.connected import connected_faces
 from pbrs_farm.repair.structure.booleans import (
     WELD_M,
     Patch,
@@ -123,15 +122,10 @@ def components(patches: Sequence[Patch]) -> list[I64]:
     positions = np.concatenate([p.positions for p in patches])
     # Number the places of corners through all patches.
     _, node = numbered_points(np.round(positions / WELD_M))
-    faces = node[faces_of_patches(patches)]
-    # Connect the corners of each face, then label connected places.
-    rows, columns = faces[:, [0, 1]].ravel(), faces[:, [1, 2]].ravel()
-    n = int(node.max()) + 1
-    graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(n, n))
-    label = connected_components(graph, directed=False)[1][faces[:, 0]]
+    label = connected_faces(node[faces_of_patches(patches)])
     # Hand the labels of faces back to their patches.
     ends = np.cumsum([len(p.faces) for p in patches])
-    return [np.asarray(part, np.int64) for part in np.split(label, ends[:-1])]
+    return np.split(label, ends[:-1])
 
 
 def _split(patches: Sequence[Patch], labels: Sequence[I64]) -> list[list[Patch]]:

@@ -13,7 +13,7 @@ from scipy.spatial.transform import Rotation
 from pbrs_farm.core.arrays import F64, Bools, FirstHit
 from pbrs_farm.core.camera import Camera, Intrinsics, View
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.frames import OPENCV_FROM_OPENGL
+from pbrs_farm.core.frames import OPENCV_FROM_OPENGL, affine
 from pbrs_farm.core.house import Geometry, House, ItemKind
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
 from pbrs_farm.core.recipe import CameraFields
@@ -113,9 +113,7 @@ def _pose_of_line(words: list[str], line: int, file: str) -> Pose:
         raise BadInput(
             file, place, f"qx qy qz qw is not a unit quaternion: its length is {length:.4g}, not 1"
         )
-    world_from_opencv = np.eye(4)
-    world_from_opencv[:3, :3] = Rotation.from_quat(quaternion).as_matrix()
-    world_from_opencv[:3, 3] = numbers[1:4]
+    world_from_opencv = affine(Rotation.from_quat(quaternion).as_matrix(), numbers[1:4])
     return Pose(line, float(numbers[0]), world_from_opencv @ OPENCV_FROM_OPENGL)
 
 
