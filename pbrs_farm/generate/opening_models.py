@@ -103,6 +103,11 @@ _KICK_M: Final = 0.45  # its height with the bar above it
 
 _WITH_LIGHTS: Final = {RoomType.LIVING, RoomType.KITCHEN, RoomType.DINING, RoomType.STUDIO}
 _BEAD_M: Final = 0.022  # breadth of the strips around a panel
+_BLOCK_M: Final = 0.05  # from a frame's corner to the far sides of its block
+
+_SATIN: Final = Material(
+    "satin glass", diffuse=(0.78, 0.83, 0.82), specular=(0.4, 0.4, 0.4), shininess=30.0
+)
 
 _Box = tuple[Triple, Triple]  # low and high corner
 _Field = tuple[float, float, float, float]  # left, low, right, high
@@ -162,11 +167,14 @@ def opening_model(
     frame = _frame_boxes(w, h, d, has_sill=has_sill) + _casing(w, h, d, design, has_sill=has_sill)
     if opening.kind is OpeningKind.PASSAGE:
         return Shape((boxes_surface("frame", frame, 0),), (paint,))
+    is_door = opening.kind in (OpeningKind.DOOR, OpeningKind.ENTRANCE)
+    is_entrance = opening.kind is OpeningKind.ENTRANCE
     if has_sill and design.has_vents:
         frame.append(((-0.17, h - 0.04, d / 2), (0.17, h - 0.02, d / 2 + 0.012)))
-    if opening.kind in (OpeningKind.DOOR, OpeningKind.ENTRANCE):
-        is_entrance = opening.kind is OpeningKind.ENTRANCE
+    if is_door:
         frame += _stops(w, h, d, has_threshold=is_entrance)
+    body = [boxes_surface("frame", frame, 0)]
+    if is_door:
         form = "" if is_entrance else door_form(design, rooms)
         kind = (
             design.entrance if is_entrance else design.lights if form == "lights" else design.leaf
@@ -180,10 +188,8 @@ def opening_model(
         # It hangs at the front of its leaf, which swings into the room.
         hinge = (side * (w / 2 - _FRAME_M - _GAP_M), 0.0, d / 2 - 0.005)
         hung = Joint("leaf 1", JointKind.REVOLUTE, hinge, (0.0, side, 0.0), _WIDE_OPEN_RAD)
-        satin = Material("satin glass", diffuse=(0.78, 0.83, 0.82), specular=(0.4, 0.4, 0.4))
-        made_of = (paint, metal, replace(satin, shininess=30.0))[: 3 if panes else 2]
-        return _with_joints([boxes_surface("frame", frame, 0)], [(hung, moving)], made_of)
-    body = [boxes_surface("frame", frame, 0)]
+        made_of = (paint, metal, _SATIN)[: 3 if panes else 2]
+        return _with_joints(body, [(hung, moving)], made_of)
     hung_sashes = []
     is_french = opening.kind is OpeningKind.FRENCH_WINDOW
     for k, (x, bars, panes, catches) in enumerate(_sashes(w, h, design, is_french=is_french)):
@@ -242,22 +248,21 @@ def _casing(w: float, h: float, d: float, design: OpeningDesign, *, has_sill: bo
     strips = [(0.008, 0.03, 0.006)]
     if design.casing == "double":
         strips = [(0.002, 0.02, 0.008), (0.034, 0.046, 0.004)]
-    block, low = (0.05, h - 0.05), 0.05 if has_sill else 0.0
     is_blocks = design.casing == "blocks"
     sheets: list[tuple[float, float, float, float, float]] = []  # left, low, right, high, height
     for near, far, out in strips:
         x0, x1 = w / 2 - near, w / 2 - far
-        base = (block[0] if is_blocks else near) if has_sill else 0.0
-        top, reach = (block[1], w / 2 - block[0]) if is_blocks else (h - near, x1)
-        sheets += [(-x0, base, -x1, top, out), (x1, base, x0, top, out)]
-        sheets.append((-reach, h - far, reach, h - near, out))
+        # Blocks interrupt the strips at the corners.
+        y, x = (_BLOCK_M, w / 2 - _BLOCK_M) if is_blocks else (near, x1)
+        base = y if has_sill else 0.0
+        sheets += [(-x0, base, -x1, h - y, out), (x1, base, x0, h - y, out)]
+        sheets.append((-x, h - far, x, h - near, out))
         if has_sill:
-            sheets.append((-reach, near, reach, min(far, _FRAME_M * 0.7), out))
+            sheets.append((-x, near, x, min(far, _FRAME_M * 0.7), out))
     if is_blocks:
-        ys = [(0.002, low), (*block[1:], h - 0.002)][not has_sill :]
-        for y0, y1 in ys:
-            for x in (-w / 2 + 0.002, w / 2 - 0.05):
-                sheets.append((x, y0, x + 0.048, y1, 0.009))
+        ys = ([0.002] if has_sill else []) + [h - _BLOCK_M]
+        xs, side = (0.002 - w / 2, w / 2 - _BLOCK_M), _BLOCK_M - 0.002
+        sheets += [(x, y, x + side, y + side, 0.009) for y in ys for x in xs]
     return [
         ((x0, y0, z), (x1, y1, z + out))
         for x0, y0, x1, y1, out in sheets
