@@ -20,6 +20,8 @@ from typing import Any, Final
 from xml.etree import ElementTree
 
 from benchmarks.figures import write_report
+from benchmarks.stream_wait import UNITS as UNITS_OF_STREAM
+from benchmarks.stream_wait import stream_figures
 from pbrs_farm.check.question_answers import wrong_answers
 from pbrs_farm.curate.teaching_rules import REASONS, judged_by
 from pbrs_farm.export.export_views import finished_entries
@@ -33,6 +35,7 @@ UNITS: Final = {
     "sets.questions_wrong": "questions with another answer by a checker of its own",
     "sets.blind_best": "largest share of right answers by always giving the same one of four",
     "sets.blind": "score of the best blind answer, by type",
+    **UNITS_OF_STREAM,
     "sets.curated": "views that each rule of `select --by` leaves out of the pictures and walks of the questions",
 }
 _PICTURES: Final = "made:70101..70104"
@@ -83,6 +86,7 @@ def main() -> None:
         passing = beside.submit(_passed)
         figures_of_sets = {"sets.same_bytes": int(_is_made_alike()), **_questions()}
         passed = passing.result()
+    figures_of_sets |= stream_figures()
     wrong = [form for form in READ_BACK if not _is_equal(form, passed)]
     figures: dict[str, Any] = {
         "sets.forms": len(READ_BACK) - len(wrong),

@@ -1,0 +1,144 @@
+"""How long a trainer waits for a stream, and whether its bytes repeat; part of `make bench NAME=sets`.
+
+The study's plan `lite` trains normals on 160x120 views of two generated homes, on the cores that also render. Of
+each reuse the timed epochs follow an epoch at whose end the renderer has worked as far ahead as it gets. Steps are as
+long as they are on these shared cores; `stream.step_s` is their time with idle cores.
+"""
+
+from __future__ import annotations
+
+import hashlib
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+
+import pbrs_farm as pf
+
+UNITS: Final = {
+    "stream.wait_share": "share of the time that training waits for views, by epochs of reuse; two cores, 160x120",
+    "stream.step_s": "s per step of 4 views of plan lite, with idle cores",
+    "stream.view_s": "s per rendered view during training without reuse",
+    "stream.same_bytes": "1: an epoch had the same bytes with 0 and 2 workers, and when rendered again after a kill",
+}
+_SET: Final = """
+[render]
+recipe = "preview"
+[part.views]
+homes = ["made:70101..70102"]
+views = 4
+"""
+_BATCH: Final = 4
+_STARTS: Final = {
+    4: 40,
+    2: 60,
+    1: 50,
+}  # reuse -> first epoch, so that no two have a generation in common
+
+
+def stream_figures() -> dict[str, Any]:
+    """The figures of UNITS; needs torch."""
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder, "two.toml")
+        file.write_text(_SET)
+        return _figures(file, Path(folder, "cache"))
+
+
+def _figures(file: Path, cache: Path) -> dict[str, Any]:
+    def stream(reuse: int) -> Any:
+        layers = ("colour", "normal")
+        return pf.stream(file, size=(160, 120), layers=layers, reuse=reuse, cache=cache)
+
+    step = _trainer()
+    shares: dict[str, float] = {}
+    view_s = 0.0
+    for reuse, first in _STARTS.items():
+        epochs = stream(reuse)
+        for _ in _batches(epochs.epoch(first), 0):
+            pass
+        waited_s = total_s = 0.0
+        for epoch in range(first, first + 1 + reuse):
+            waits = _waits(_batches(epochs.epoch(epoch), 1), step)
+            if epoch > first:
+                waited_s, total_s = waited_s + waits[0], total_s + waits[1]
+        shares[str(reuse)] = round(waited_s / total_s, 3)
+        view_s = total_s / len(epochs)
+        print(f"   reuse {reuse}: waited {waited_s:.1f} of {total_s:.1f} s", flush=True)
+    digests = {_digest(_batches(epochs.epoch(51), workers)) for workers in (0, 2)}
+    epochs.close()
+    for unit in epochs.plan.folder.glob("units/*-000051.npz"):
+        unit.unlink()
+    digests.add(_digest(_batches(epochs.epoch(51), 2)))
+    epochs.close()
+    batch = next(iter(_batches(epochs.epoch(51), 0)))
+    epochs.close()
+    return {
+        "stream.wait_share": shares,
+        "stream.step_s": round(min(_seconds(lambda: step(batch)) for _ in range(3)), 3),
+        "stream.view_s": round(view_s, 2),
+        "stream.same_bytes": int(len(digests) == 1),
+    }
+
+
+def _batches(epoch: Any, workers: int) -> Any:
+    from torch.utils.data import DataLoader
+
+    return DataLoader(epoch, batch_size=_BATCH, num_workers=workers)
+
+
+def _waits(batches: Any, step: Callable[[Any], None]) -> tuple[float, float]:
+    """Seconds of waiting, and of all, of an epoch."""
+    began_s = last_s = time.perf_counter()
+    waited_s = 0.0
+    for batch in batches:
+        waited_s += time.perf_counter() - last_s
+        step(batch)
+        last_s = time.perf_counter()
+    return waited_s, last_s - began_s
+
+
+def _trainer() -> Callable[[Any], None]:
+    """A training step of the study's plan `lite` for normals."""
+    import torch
+
+    from pbrs_farm.study.networks.network_choice import network_of
+    from pbrs_farm.study.tasks.losses import normal_loss
+    from pbrs_farm.study.training.prediction import as_colour, network_output
+    from pbrs_farm.study.training_plan import plan_of
+
+    plan = plan_of("normals", "lite")
+    network = network_of(plan.network, 3)
+    optimiser = torch.optim.AdamW(network.parameters(), plan.rate)
+
+    def step(batch: Any) -> None:
+        output = network_output(network, as_colour(batch["colour"]), plan)
+        normal = batch["normal"].permute(0, 3, 1, 2)
+        losses = normal_loss(output, normal, batch["valid"], kind=plan.loss, over=plan.loss_over)
+        optimiser.zero_grad()
+        losses.mean().backward()
+        optimiser.step()
+
+    return step
+
+
+def _digest(batches: Any) -> str:
+    sha = hashlib.sha256()
+    for batch in batches:
+        for name, value in sorted(batch.items()):
+            data = value if isinstance(value, list) else np.asarray(value).tobytes()
+            sha.update(f"{name} {data!r}".encode())
+    return sha.hexdigest()
+
+
+def _seconds(act: Callable[[], None]) -> float:
+    began_s = time.perf_counter()
+    act()
+    return time.perf_counter() - began_s
+
+
+if __name__ == "__main__":
+    for figure, measured in stream_figures().items():
+        print(figure, measured, UNITS[figure])
