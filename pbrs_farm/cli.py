@@ -18,7 +18,7 @@ from typing import Final
 
 import pbrs_farm
 from pbrs_farm.commands.arguments import Handler, echo, warn
-from pbrs_farm.commands.command_line import VERBS, Parser, unknown_words, verb_first
+from pbrs_farm.commands.command_line import VERBS, Parser, add_arguments, unknown_words, verb_first
 from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.shown_text import did_you_mean
 from pbrs_farm.crash_notes import waiting_lines
@@ -173,6 +173,7 @@ def build_parser(module: str | None = None, words: Sequence[str] | None = None) 
         sub: Parser = add_parser(name, help=row.help, description=row.help, parents=[common])
         sub.examples = tuple(row.examples.split("; "))
         sub.set_defaults(handler=handler)
+        add_arguments(sub, name)
         return sub
 
     for name in [module] if module else MODULES:

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, cast
 
 from pbrs_farm.commands.command_line import Parser
-from pbrs_farm.commands.options import add_options, group_of
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.number_ranges import seeds_of
 from pbrs_farm.core.shown_text import escaped, printable, shown
@@ -29,16 +28,10 @@ Handler = Callable[[argparse.Namespace], int | None]
 # (name, handler) -> the verb's parser; verbs.csv has its help
 Verb = Callable[[str, Handler], Parser]
 
-# Help texts of the arguments for a home and for a view.
-HOME: Final = (
-    "home file, folder of home files (not of subfolders; `inputs` lists the formats), example home's"
-    " name, `builtin`, `made:SEED`, or `plugin:NAME,SEED`"
-)
 _MAX_LINE: Final = (
     1500  # maximum characters of a warning: room for a command that reproduces a fault
 )
 MAX_SEEDS: Final = 100_000  # maximum seeds of one command
-VIEW: Final = "folder of a view: OUT/houses/<house>/views/<view>"
 
 
 def warn(text: str) -> None:
@@ -84,21 +77,6 @@ def at_least(name: str, value: float, least: int) -> None:
     """Raise BadInput, naming the option, if its value is below the minimum."""
     if value < least:
         raise BadInput(name, str(value), f"expected {least} or more")
-
-
-def add_home(p: argparse.ArgumentParser) -> None:
-    """Add arguments for a home (`args.home`) and the folder of its models (`args.models`, "")."""
-    from pbrs_farm.run.request import ModelsOption
-
-    p.add_argument("home", help=HOME)
-    add_options(p, ModelsOption)
-
-
-def add_set(p: argparse.ArgumentParser, metavar: str, text: str) -> None:
-    """Add --set, repeatable: a list of "path=value" of what metavar names, which `fields_set` parses."""
-    group_of(p, "recipe").add_argument(
-        "--set", action="append", default=[], metavar=metavar, help=text
-    )
 
 
 def home_arguments(homes: Sequence[str], houses: str | None) -> list[str]:
@@ -223,15 +201,6 @@ def put_files(folder: Path, files: Mapping[str, bytes]) -> None:
     for name, data in files.items():
         store.put(name, data)
     store.tidy()
-
-
-def add_farm(p: argparse.ArgumentParser) -> None:
-    """Add the options of every farm verb but submit (workers/job.py): --store and --json."""
-    # Not generated from a model: the small verbs import no models.
-    p.add_argument(
-        "--store", default="", metavar="URL", help="store of the farm (default: $PBRS_STORE)"
-    )
-    p.add_argument("--json", action="store_true", help="print JSON")
 
 
 def farm_of(args: argparse.Namespace) -> Farm:

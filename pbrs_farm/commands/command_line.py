@@ -4,11 +4,13 @@ from __future__ import annotations
 
 import argparse
 import csv
+import functools
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any, Final, NoReturn
+from typing import Any, Final, NamedTuple, NoReturn
 
+from pbrs_farm.commands.options import group_of
 from pbrs_farm.core.shown_text import did_you_mean, hint_of_choice
 
 _TABLE: Final = Path(__file__).with_name("verbs.csv")
@@ -32,6 +34,69 @@ def _rows() -> tuple[VerbRow, ...]:
 
 VERBS: Final = {row.verb: row for row in _rows()}
 """Every verb, in the order of the help."""
+
+_TYPES: Final = {"text": str, "int": int, "float": float, "path": Path}
+# Phrases that several rows of arguments.csv have.
+_PHRASES: Final = {
+    "HOME": "home file, folder of home files (not of subfolders; `inputs` lists the formats), example"
+    " home's name, `builtin`, `made:SEED`, or `plugin:NAME,SEED`",
+    "VIEW": "folder of a view: OUT/houses/<house>/views/<view>",
+    "ON": "[NAME=]ROOT[@MODE], nyu_depth_v2_labeled.mat, or a folder of photographs with depth;"
+    " repeatable",
+}
+
+
+class _ArgumentRow(NamedTuple):
+    """A row of arguments.csv, whose head explains the columns."""
+
+    verbs: str
+    argument: str
+    type: str
+    many: str
+    default: str
+    metavar: str
+    choices: str
+    group: str
+    help: str
+
+    def words(self) -> dict[str, Any]:
+        """The keywords of add_argument."""
+        text = self.help.format_map(_PHRASES)
+        if self.type == "flag":
+            return {"action": "store_true", "help": text}
+        kind = _TYPES[self.type]
+        words: dict[str, Any] = {"type": kind, "metavar": self.metavar or None, "help": text}
+        if self.choices:
+            words["choices"] = [kind(choice) for choice in self.choices.split()]
+        for mark in self.many.split():
+            if mark == "repeat":
+                words |= {"action": "append", "default": []}
+            elif mark == "required":
+                words["required"] = True
+            else:
+                nargs, _equals, const = mark.partition("=")
+                words |= {"nargs": nargs, "const": const} if const else {"nargs": nargs}
+        if self.default:
+            values = [kind(word) for word in self.default.strip("[]").split()]
+            words["default"] = (
+                values if self.many == "+" else "" if self.default == "''" else values[0]
+            )
+        return words
+
+
+@functools.cache
+def _argument_rows() -> tuple[_ArgumentRow, ...]:
+    lines = _TABLE.with_name("arguments.csv").read_text(encoding="utf-8").splitlines()
+    return tuple(_ArgumentRow(*row) for row in csv.reader(lines[2:]))
+
+
+def add_arguments(p: argparse.ArgumentParser, verb: str) -> None:
+    """Add the verb's rows of arguments.csv, in their order, each to its group of the help."""
+    for row in _argument_rows():
+        if verb in row.verbs.split():
+            name, *field = row.argument.split()
+            words = row.words() | ({"dest": field[0]} if field else {})
+            (group_of(p, row.group) if row.group else p).add_argument(name, **words)
 
 
 class Parser(argparse.ArgumentParser):

@@ -8,30 +8,13 @@ from pathlib import Path
 from pbrs_farm.commands.arguments import Verb, counted, echo, echo_json, warn
 from pbrs_farm.commands.options import add_options, request_from
 
-SET = "indoor-1k, indoor-10k, indoor-60k, or a FILE.toml (docs/sets.md)"
-
 
 def add_verbs(verb: Verb) -> None:
     """Add make and estimate."""
     from pbrs_farm.run.request import ProcessLimitOptions
 
-    p = verb("make", _make)
-    p.add_argument("set", metavar="SET", help=SET)
-    p.add_argument("--out", required=True, help="folder of the set")
-    text = "render part K of N, e.g. 2/8; once OUT has all parts, run again without --shard"
-    p.add_argument("--shard", metavar="K/N", help=text)
-    add_options(p, ProcessLimitOptions)
-    p.add_argument("--json", action="store_true", help="print a JSON line per event")
-
-    p = verb("estimate", _estimate)
-    p.add_argument("set", metavar="SET", help=SET)
-    p.add_argument(
-        "--cloud",
-        nargs="+",
-        metavar="NAME",
-        help="print an itemised bill of these clouds; `estimate SET` lists them",
-    )
-    p.add_argument("--json", action="store_true", help="print JSON")
+    add_options(verb("make", _make), ProcessLimitOptions)
+    verb("estimate", _estimate)
 
 
 def _make(args: argparse.Namespace) -> int:

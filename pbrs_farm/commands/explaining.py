@@ -11,7 +11,6 @@ from typing import TYPE_CHECKING, Final
 
 from pbrs_farm.commands.arguments import (
     Verb,
-    add_home,
     at_least,
     counted,
     dress_seeds,
@@ -44,46 +43,21 @@ def add_verbs(verb: Verb) -> None:
     from pbrs_farm.run.request import (
         CameraOptions,
         LibraryOptions,
+        ModelsOption,
         RecipeOptions,
         SeededRecipeOptions,
     )
 
-    p = verb("dress", _dress)
-    add_home(p)
-    add = p.add_argument
-    text = "seed of the dressing; another seed gives another home (default 1)"
-    add("--seed", dest="dress", default="1", metavar="N", help=text)
-    text = "folder for before_after.png, house.glb, house.json, dress.json, repair.json"
-    add("--out", type=Path, required=True, help=text)
-    text = "number of rooms with before and after pictures (default 1; 0 = none)"
-    add("--views", type=int, default=1, metavar="N", help=text)
-    add_options(p, LibraryOptions)
-    add_options(p, RecipeOptions)
-
-    p = verb("catalogue", _catalogue)
-    text = "3D-FUTURE, hssd-models, objathor, GLB or OBJ with a CSV, or .sh3f, as for --catalogue"
-    p.add_argument("libraries", nargs="+", type=Path, metavar="LIBRARY", help=text)
-    text = "write the rejected models to FILE.csv: kind, model, reason"
-    p.add_argument("--refused", type=Path, metavar="FILE.csv", help=text)
-    p.add_argument("--json", action="store_true", help="print JSON")
-
-    p = verb("repair", _repair)
-    add_home(p)
-    text = "folder for house.glb, house.json, repair.json, cut_<level>.svg"
-    p.add_argument("--out", type=Path, required=True, help=text)
-    add_options(p, SeededRecipeOptions)
-
-    p = verb("cameras", _cameras)
-    add_home(p)
-    add = p.add_argument
-    text = "draw candidates, rejections and winners on a floor plan: FILE.png and FILE.svg"
-    add("--map", type=Path, metavar="FILE", help=text)
-    add("--out", type=Path, metavar="FILE", help="write the views to FILE, as cameras.json")
-    add("--per-sector", type=int, metavar="K", help="keep K diverse views per sector (default 1)")
-    add("--exact", action="store_true", help="score every candidate at full size")
-    add_options(p, CameraOptions)
-    add("--json", action="store_true", help="print views and report as JSON")
-    add_options(p, SeededRecipeOptions)
+    models = {
+        "dress": (_dress, (ModelsOption, LibraryOptions, RecipeOptions)),
+        "catalogue": (_catalogue, ()),
+        "repair": (_repair, (ModelsOption, SeededRecipeOptions)),
+        "cameras": (_cameras, (ModelsOption, CameraOptions, SeededRecipeOptions)),
+    }
+    for name, (handler, options) in models.items():
+        p = verb(name, handler)
+        for model in options:
+            add_options(p, model)
 
 
 def _catalogue(args: argparse.Namespace) -> int:

@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from pbrs_farm.commands.arguments import Verb, at_least, counted, echo, echo_json, warn
+from pbrs_farm.commands.command_line import add_arguments
 from pbrs_farm.core.errors import BadInput, MachineFailed
 
 if TYPE_CHECKING:
@@ -21,45 +22,15 @@ _SAY_EVERY_S: Final = 5.0
 
 def add_verbs(verb: Verb) -> None:
     """Add homes and its subcommand make."""
-    p = verb("homes", _homes)
-    p.add_argument("--fetch", action="store_true", help="download the example homes (17 MB)")
-    text = "download the furniture for dressing and for generated homes (120 MB)"
-    p.add_argument("--furniture", action="store_true", help=text)
-    p.add_argument("--json", action="store_true", help="print JSON")
-    parts = p.add_subparsers(metavar="make")
-    text = "generate furnished homes as .sh3d files, with their plans in plans.html"
-    _add_make(parts.add_parser("make", help=text, description=text))
-
-
-def _add_make(p: argparse.ArgumentParser) -> None:
     from pbrs_farm.core.made_home import PLANS
 
+    parts = verb("homes", _homes).add_subparsers(metavar="make")
+    text = "generate furnished homes as .sh3d files, with their plans in plans.html"
+    p = parts.add_parser("make", help=text, description=text)
     p.set_defaults(handler=_make)
-    add = p.add_argument
-    add("count", nargs="?", type=int, default=1, metavar="N", help="number of homes (default 1)")
-    add(
-        "--seed",
-        type=int,
-        default=1,
-        help="seed of the first home; the next ones follow (default 1)",
-    )
-    add("--out", type=Path, default=Path("homes"), help="output folder (default homes/)")
-    add("--rooms", metavar="LOW..HIGH", help="number of bedrooms, 0 to 4, e.g. 2..4")
-    add("--area", metavar="LOW..HIGH", help="floor area of all rooms, square metres, e.g. 60..90")
-    add("--style", metavar="NAME", help="style of furniture and paints, e.g. nordic")
+    add_arguments(p, "homes:make")
     text = f"type of floor plan (default: drawn by the seed): {', '.join(PLANS)}"
-    add("--plans", metavar="NAME", help=text)
-    add("--storeys", metavar="N", help="number of storeys, 1 or 2 (default 1)")
-    add("--offices", metavar="N", help="bedrooms that become offices (default: by chance)")
-    text = "leave the rooms empty; needs no furniture package"
-    add("--empty", action="store_true", help=text)
-    add("--programme", type=Path, metavar="FILE", help="JSON file with the rooms of a home")
-    text = "furnish this floor plan: JSON, GeoJSON, CSV, SVG or TXT (docs/houses/plans.md)"
-    add("--plan", type=Path, metavar="FILE", help=text)
-    add("--apartment", default="", metavar="ID", help="id of the apartment in a CSV with several")
-    text = "storey of the plan, from 0 (default all)"
-    add("--floor", type=int, metavar="K", help=text)
-    add("--jobs", type=int, default=1, metavar="N", help="number of processes (default 1)")
+    p.add_argument("--plans", metavar="NAME", help=text)
 
 
 def _homes(args: argparse.Namespace) -> None:

@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pbrs_farm.commands.arguments import (
-    VIEW,
     Verb,
     counted,
     echo,
@@ -31,10 +30,6 @@ if TYPE_CHECKING:
     from pbrs_farm.views.packing.pack_options import PackOptions
     from pbrs_farm.views.packing.packing_plan import Packing
 
-SPLIT = (
-    "split by home into train/val/test, in per cent (default 80/10/10; without --split: no split)"
-)
-
 
 def add_verbs(verb: Verb) -> None:
     """Add export, pack, classes and label-sheet."""
@@ -44,37 +39,12 @@ def add_verbs(verb: Verb) -> None:
 
     p = verb("export", _export)
     p.options_by_words = _add_form_options
-    add = p.add_argument
-    add("folder", metavar="ROOT", help="an output folder, or s3://bucket/prefix")
-    add(
-        "--to",
-        required=True,
-        choices=form_names(),
-        help="format (docs/formats/export.md); `--to FORMAT --help` lists its options",
-    )
-    add("--out", type=Path, help="new folder (default ROOT_<format>)")
-    add("--selection", metavar="RUN", help="only views kept by this run of `select`")
+    text = "format (docs/formats/export.md); `--to FORMAT --help` lists its options"
+    p.add_argument("--to", required=True, choices=form_names(), help=text)
     add_options(p, ViewOptions)
-    add("--split", nargs="?", const="80/10/10", metavar="SHARES", help=SPLIT)
-
-    p = verb("pack", _pack_views)
-    add = p.add_argument
-    add("root", metavar="ROOT", help="an output folder, or s3://bucket/prefix")
-    add("--out", type=Path, required=True, help="new folder")
-    add("--to", choices=("shards", "parquet"), default="shards", help="format (default shards)")
-    add("--selection", metavar="RUN", help="only views kept by this run of `select`")
-    add_options(p, PackOptions)
-    add("--split", nargs="?", const="80/10/10", metavar="SHARES", help=SPLIT)
-    add("--seed", type=int, default=0, help="seed of the order of views (default 0)")
-
-    p = verb("classes", _count_classes)
-    p.add_argument("folder", metavar="FOLDER|HOME", help="output folder or home")
-    add_options(p, ModelsOption)
-    p.add_argument("--json", action="store_true", help="print JSON")
-
-    p = verb("label-sheet", _label_sheet)
-    p.add_argument("view", type=Path, help=VIEW)
-    p.add_argument("--out", type=Path, help="PNG file (default ./VIEW_labels.png)")
+    add_options(verb("pack", _pack_views), PackOptions)
+    add_options(verb("classes", _count_classes), ModelsOption)
+    verb("label-sheet", _label_sheet)
 
 
 def _add_form_options(p: argparse.ArgumentParser, words: Sequence[str] | None) -> None:

@@ -15,7 +15,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pbrs_farm.commands.arguments import Verb, echo, echo_json
-from pbrs_farm.commands.completion_scripts import SHELLS, completion_script
+from pbrs_farm.commands.completion_scripts import completion_script
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import RECIPE_NAMES, Recipe, recipe_from_name
 from pbrs_farm.core.shown_text import did_you_mean
@@ -27,26 +27,19 @@ if TYPE_CHECKING:
 def add_verbs(verb: Verb) -> None:
     """Add doctor, help, cache, inputs, skies, recipes, layers and completion."""
     p = verb("doctor", _doctor)
-    p.add_argument("--json", action="store_true", help="print JSON")
     p.add_argument("--store", default=os.environ.get("PBRS_STORE", ""), help="store to check")
     p.add_argument("--redis", default=os.environ.get("PBRS_REDIS_URL", ""), help="Redis to check")
-    p = verb("help", _help)
-    p.add_argument(
-        "page", nargs="?", default="", help="a page, or a word to look for; default: list all pages"
-    )
-    p = verb("cache", _cache)
-    p.add_argument(
-        "--clear", nargs="*", metavar="NAME", help="delete these entries, or all without a name"
-    )
-    p = verb("inputs", _inputs)
-    p.add_argument("--json", action="store_true", help="print JSON")
-    p = verb("skies", _skies)
     p = verb("recipes", _recipes)
     p.add_argument("name", nargs="?", default="fast", choices=RECIPE_NAMES, help="default fast")
-    p.add_argument("--toml", action="store_true", help="print TOML, for --recipe FILE.toml")
-    p = verb("layers", _layers)
-    p = verb("completion", _completion)
-    p.add_argument("shell", choices=SHELLS, help="shell of the script")
+    for name, handler in (
+        ("help", _help),
+        ("cache", _cache),
+        ("inputs", _inputs),
+        ("skies", _skies),
+        ("layers", _layers),
+        ("completion", _completion),
+    ):
+        verb(name, handler)
 
 
 def _doctor(args: argparse.Namespace) -> int:

@@ -13,7 +13,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pbrs_farm.commands.arguments import (
-    HOME,
     Verb,
     counted,
     dress_seeds,
@@ -24,7 +23,7 @@ from pbrs_farm.commands.arguments import (
     store_of,
     warn,
 )
-from pbrs_farm.commands.options import add_options, group_of, request_from
+from pbrs_farm.commands.options import add_options, request_from
 from pbrs_farm.commands.using import write_sheets
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.made_home import is_made
@@ -44,50 +43,16 @@ def add_verbs(verb: Verb) -> None:
     from pbrs_farm.run.request import CameraOptions, ModelsOption, ObjectsRequest, RunRequest
 
     p = verb("demo", _demo)
-    text = "example home, `builtin`, or home file (default Studio)"
-    p.add_argument("--home", default="Studio", help=text)
-    p.add_argument("--out", default="out/demo", help="output folder (default out/demo)")
-    p.add_argument("--bare", action="store_true", help="do not dress the home")
     add_options(p, RunRequest, recipe="preview")
     # A first-time user's command ends in seconds.
     p.set_defaults(views=6)
     p.epilog = "Renders six views unless --views gives another number."
-
     p = verb("run", _run)
-    add = p.add_argument
-    add("homes", nargs="*", metavar="HOME", help=HOME)
-    add("--home", action="append", default=[], metavar="PATH", help="same as HOME, repeatable")
-    text = "file with one SUNCG house id per line; HOME is SUNCG's root folder"
-    add("--houses", metavar="LIST", help=text)
-    add("--out", help="output folder or store URL (default: out/NAME, of the first home)")
-    add_options(p, CameraOptions)
-    add_options(p, ModelsOption)
-    text = "use these cameras: a JSON list, or room_camera.txt (docs/cameras.md)"
-    group_of(p, "viewpoints").add_argument("--camera-file", type=Path, help=text)
-    add_options(p, RunRequest)
     p.usage = "%(prog)s HOME [HOME ...] [options]"
-
-    p = verb("objects", _objects)
-    add = p.add_argument
-    text = "folders of OBJ or GLB files (also in ShapeNet's layout), or .sh3f libraries"
-    add("models", nargs="+", type=Path, metavar="MODELS", help=text)
-    text = "categories to pick from, e.g. bed,chair,cabinet (default all)"
-    add("--categories", default="", metavar="A,B", help=text)
-    text = "number of models, picked at random (default 3500)"
-    add("--count", type=int, default=3500, metavar="N", help=text)
-    add("--out", required=True, help="output folder or store URL")
-    add_options(p, ObjectsRequest)
-
-    p = verb("step", _step)
-    add = p.add_argument
-    add("step", help="name of the step, e.g. light")
-    add("home", help=HOME)
-    add("--out", required=True, help="output folder or store URL of the run")
-    add("--view", metavar="VIEW", help="id of the view, for steps of views")
-    text = "optional layers of the step truth"
-    add("--layers", nargs="+", default=[], metavar="LAYER", help=text)
-    add("--dress", type=int, default=0, metavar="SEED", help="seed of a dressed variant")
-    add_options(p, ModelsOption)
+    for model in (CameraOptions, ModelsOption, RunRequest):
+        add_options(p, model)
+    add_options(verb("objects", _objects), ObjectsRequest)
+    add_options(verb("step", _step), ModelsOption)
 
 
 def _run(args: argparse.Namespace) -> int:

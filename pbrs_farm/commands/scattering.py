@@ -6,11 +6,9 @@ import argparse
 import warnings
 from collections import Counter
 from collections.abc import Iterator, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING
 
 from pbrs_farm.commands.arguments import (
-    HOME,
     Verb,
     at_least,
     counted,
@@ -33,40 +31,7 @@ def add_verbs(verb: Verb) -> None:
     """Add scatter."""
     from pbrs_farm.run.request import SeededRecipeOptions
 
-    p = verb("scatter", _scatter)
-    add = p.add_argument
-    add("homes", nargs="+", metavar="HOME", help=HOME)
-    text = "folder, file or pattern of GLB, glTF, OBJ, PLY, STL or OFF files, repeatable"
-    add("--models", action="append", required=True, metavar="PATH", help=text)
-    add("--out", required=True, help="output folder or store URL")
-    add("--count", type=int, default=20, metavar="N", help="objects per scene (default 20)")
-    add("--scenes", type=int, default=1, metavar="N", help="scenes per home (default 1)")
-    add("--views", type=int, default=5, metavar="N", help="views per scene (default 5)")
-    add("--physics", action="store_true", help="drop the objects and simulate until they rest")
-    text = "place the objects in mid-air, in random poses, without contact"
-    add("--float", action="store_true", dest="floating", help=text)
-    add("--on", default="", metavar="NAME", help="place them on this furniture, or in this room")
-    add("--room", default="", metavar="NAME", help="place them anywhere in this room")
-    add("--unit", default="m", help="unit of the models: m, cm, mm or inch (default m)")
-    add("--size-m", type=float, metavar="M", help="scale to this longest side, metres")
-    add("--up", default="", help="up axis of the models: x, y or z (default: as their format)")
-    add("--credit", default="", metavar="TEXT", help="credit line for pictures of the models")
-    text = "distance from the camera to its target, metres (default 0.5..1.2)"
-    add("--distance", default="0.5..1.2", metavar="A..B", help=text)
-    text = "BOP camera.json with K and size of the pictures"
-    add("--camera", type=Path, metavar="FILE", help=text)
-    text = "minimum visible share of the target (default 0.5)"
-    add("--visible", type=float, default=0.5, metavar="SHARE", help=text)
-    add("--dress", metavar="SEED", help="dress the home first, with this seed")
-    add(
-        "--modes",
-        nargs="+",
-        default=["mlt_il_ol"],
-        metavar="MODE",
-        help="modes (default mlt_il_ol)",
-    )
-    add("--layers", nargs="+", default=[], metavar="LAYER", help="optional layers to write")
-    add_options(p, SeededRecipeOptions)
+    add_options(verb("scatter", _scatter), SeededRecipeOptions)
 
 
 def _scatter(args: argparse.Namespace) -> None:

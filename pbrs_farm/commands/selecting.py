@@ -8,7 +8,6 @@ from typing import TYPE_CHECKING
 
 from pbrs_farm.commands.arguments import (
     Verb,
-    add_set,
     echo,
     echo_json,
     fields_set,
@@ -33,40 +32,8 @@ if TYPE_CHECKING:
 
 def add_verbs(verb: Verb) -> None:
     """Add reference and select."""
-    p = verb("reference", _reference)
-    add = p.add_argument
-    add("action", choices=("build",), help="always build")
-    add("source", type=Path, help="folder of RGB-D pairs, or nyu_depth_v2_labeled.mat")
-    add("--out", type=Path, required=True, help="reference file to write")
-    add_set(p, "FIELD=VALUE", "override histogram.FIELD or selection.FIELD, repeatable")
-    _add_photographs(p)
-
-    p = verb("select", _select)
-    add = p.add_argument
-    add("folder", help="output folder or store URL")
-    text = "reference file, folder of RGB-D pairs, or .mat file"
-    add("--reference", type=Path, help=text)
-    text = "drop uninformative views by these rules instead: black plane cut twins"
-    add("--by", nargs="+", metavar="RULE", help=text)
-    add("--selection", metavar="RUN", help="with --by: select from the views kept by this run")
-    add("--run", default="default", help="name of this selection and its files (default default)")
-    add_set(p, "FIELD=VALUE", "override selection.FIELD, e.g. selection.min_depth=0.6, repeatable")
-    add("--score-mode", help="mode to score if a view has no mlt_il_ol")
-    add("--per-room-cap", type=int, metavar="N", help="keep at most the N best views of a room")
-    add("--balance", choices=("none", "classes"), help="balance the classes of the kept views")
-    add("--report", action="store_true", help="also write selection/<run>.html")
-    text = "folder of the photographs, to show the nearest ones in the report"
-    add("--photographs", type=Path, metavar="FOLDER", help=text)
-    add("--json", action="store_true", help="print the summary as JSON")
-    _add_photographs(p)
-
-
-def _add_photographs(p: argparse.ArgumentParser) -> None:
-    """Add the options for reading photographs."""
-    add = p.add_argument
-    add("--depth-scale", type=float, help="depth units per metre (default by file kind)")
-    add("--sun-rgbd", action="store_true", help="undo SUN RGB-D's rotation of depth bits")
-    add("--no-crop", action="store_true", help="keep the border of the depth registration")
+    verb("reference", _reference)
+    verb("select", _select)
 
 
 def _overrides(arguments: list[str]) -> dict[str, str]:

@@ -22,21 +22,7 @@ if TYPE_CHECKING:
 
 def add_verbs(verb: Verb) -> None:
     """Add board."""
-    p = verb("board", _board)
-    add = p.add_argument
-    add("root", nargs="?", default="", help="output folder or store URL (default $PBRS_STORE)")
-    add("--host", default="127.0.0.1", help="address to listen on (default 127.0.0.1)")
-    add("--port", type=int, default=8080, help="port (default 8080; 0 = any free port)")
-    text = "host name that browsers use for the board, repeatable (for a proxy)"
-    add("--allow-host", action="append", default=[], metavar="NAME", help=text)
-    text = "file with the token for changes, and for reading from other machines (default: a new token)"
-    add("--token-file", type=Path, metavar="FILE", help=text)
-    add("--readonly", action="store_true", help="allow no changes")
-    text = "folder for the index and thumbnails (default ~/.cache/pbrs_farm/board)"
-    add("--cache", type=Path, metavar="FOLDER", help=text)
-    text = "price of a slot-hour, to show the cost of jobs"
-    add("--price", type=float, default=0.0, metavar="P", help=text)
-    add("--currency", default="EUR", help="currency of --price (default EUR)")
+    verb("board", _board)
 
 
 def _board(args: argparse.Namespace) -> None:

@@ -9,16 +9,7 @@ import time
 from collections.abc import Callable
 from typing import TYPE_CHECKING, Any
 
-from pbrs_farm.commands.arguments import (
-    Handler,
-    Verb,
-    add_farm,
-    counted,
-    echo,
-    echo_json,
-    farm_of,
-    warn,
-)
+from pbrs_farm.commands.arguments import Handler, Verb, counted, echo, echo_json, farm_of, warn
 from pbrs_farm.core.errors import BadInput
 from workers.client.text import (
     changes_text,
@@ -29,7 +20,6 @@ from workers.client.text import (
     users_text,
     workers_text,
 )
-from workers.ids import LEAST_URGENT
 from workers.ledger.task_ledger import SPENT_DAYS, WITH_FAILURES
 
 if TYPE_CHECKING:
@@ -39,105 +29,35 @@ if TYPE_CHECKING:
 def add_verbs(verb: Verb) -> None:
     """Add status, why, logs, failures, retry, pause ... reduce, drain, workers, recover, adopt; services."""
 
-    def farm_verb(name: str, handler: Handler) -> argparse.ArgumentParser:
-        p = verb(name, handler)
-        add_farm(p)
-        return p
-
-    p = farm_verb("status", _status)
-    _add_job(p)
-    text = "refresh every two seconds until the job ends (--json: a line each)"
-    p.add_argument("--watch", action="store_true", help=text)
-    farm_verb("jobs", _jobs)
-    p = farm_verb(
-        "why",
-        _printer(lambda farm, args: farm.explain(_job_of(farm, args), args.task), explanation_text),
-    )
-    p.add_argument("task", help="HOUSE, HOUSE/VIEW or HOUSE/UNIT/STAGE")
-    _add_job(p, flag=True)
-    p = farm_verb("logs", _logs)
-    p.add_argument("task", help="HOUSE/UNIT/STAGE")
-    p.add_argument("--attempt", type=int, metavar="N", help="attempt (default the last)")
-    _add_job(p, flag=True)
-    _add_job(
-        farm_verb(
-            "failures",
-            _printer(lambda farm, args: farm.failures(_job_of(farm, args)), failures_text),
-        )
-    )
-    p = farm_verb("retry", _retry)
-    p.add_argument(
-        "tasks", nargs="*", metavar="TASK", help="HOUSE/UNIT/STAGE (default: all failed tasks)"
-    )
-    _add_job(p, flag=True)
-    p = farm_verb("rerun", _rerun)
-    p.add_argument("task", help="HOUSE/UNIT/STAGE")
-    _add_job(p, flag=True)
-    # Verbs that change a job's state take only the job.
+    printed: dict[str, Handler] = {
+        "why": _printer(lambda f, args: f.explain(_job_of(f, args), args.task), explanation_text),
+        "failures": _printer(lambda f, args: f.failures(_job_of(f, args)), failures_text),
+        "workers": _printer(lambda f, _args: f.workers(), workers_text),
+        "audit": _printer(lambda f, args: f.users.changes(args.last), changes_text),
+    }
+    handlers = {
+        "status": _status,
+        "jobs": _jobs,
+        **printed,
+        "logs": _logs,
+        "retry": _retry,
+        "rerun": _rerun,
+        "priority": _priority,
+        "limit": _limit,
+        "gc": _gc,
+        "drain": _drain,
+        "coordinator": _coordinator,
+        "worker": _worker,
+    }
+    for name, handler in handlers.items():
+        verb(name, handler)
+    # Of these the name is that of the farm's method.
     for name in ("pause", "resume", "cancel", "reduce"):
-        p = farm_verb(name, _steer)
-        p.set_defaults(what=name)
-        _add_job(p)
-    p = farm_verb("priority", _priority)
-    text = f"0 to {LEAST_URGENT}"
-    p.add_argument("number", type=int, choices=range(LEAST_URGENT + 1), metavar="NUMBER", help=text)
-    _add_job(p)
-    p = farm_verb("limit", _limit)
-    text = "maximum simultaneous tasks of the job; 0 = no limit"
-    p.add_argument("--max-slots", type=int, metavar="N", help=text)
-    text = "pause the job after this many slot-hours; 0 = no limit"
-    p.add_argument("--budget", type=float, metavar="HOURS", help=text)
-    _add_job(p)
-    p = farm_verb("gc", _gc)
-    p.add_argument(
-        "--keep", default="30d", metavar="TIME", help="keep files younger than this (default 30d)"
-    )
-    p.add_argument("--yes", action="store_true", help="remove the files")
-    p = farm_verb("drain", _drain)
-    p.add_argument("worker", help="name of the worker, from `workers`")
-    p.add_argument("--undo", action="store_true", help="let the worker accept tasks again")
-    farm_verb("workers", _printer(lambda farm, _args: farm.workers(), workers_text))
-    _add_users(farm_verb)
-    p = farm_verb("recover", _recover)
-    p.set_defaults(what="recover")
-    p.add_argument("job", help="job id")
-    p = farm_verb("adopt", _recover)
-    p.set_defaults(what="adopt")
-    p.add_argument("job", help="job id")
-    # The two services of the farm.
-    verb("coordinator", _coordinator)
-    p = verb("worker", _worker)
-    p.add_argument("--until", type=float, metavar="S", help="stop after S seconds")
-    text = "stop after S seconds without work, for rented machines"
-    p.add_argument("--until-idle", type=float, metavar="S", help=text)
-    text = "exit status after a signal, for schedulers that restart such workers"
-    p.add_argument("--preempted-code", type=int, metavar="CODE", help=text)
-
-
-def _add_users(farm_verb: Callable[[str, Handler], argparse.ArgumentParser]) -> None:
-    p = farm_verb("users", _users)
-    verbs = ("list", "add", "limit", "remove")
-    p.add_argument("what", nargs="?", default="list", choices=verbs, help="action (default list)")
-    p.add_argument("name", nargs="?", default="", metavar="NAME", help="name of the user")
-    text = "weight of the user when slots are shared (default 1)"
-    p.add_argument("--share", type=float, metavar="X", help=text)
-    text = "maximum simultaneous tasks of the user; 0 = no limit"
-    p.add_argument("--max-slots", type=int, metavar="N", help=text)
+        verb(name, _steer).set_defaults(what=name)
+    for name in ("recover", "adopt"):
+        verb(name, _recover).set_defaults(what=name)
     text = f"slot-hours of the user's jobs in {SPENT_DAYS} days; 0 = no limit"
-    p.add_argument("--slot-hours", type=float, metavar="H", help=text)
-    yes_no = ("yes", "no")
-    p.add_argument("--admin", choices=yes_no, help="allow control of all jobs, workers and users")
-    p.add_argument("--may-preempt", choices=yes_no, help="allow urgent jobs (--preempt)")
-    p = farm_verb("audit", _printer(lambda farm, args: farm.users.changes(args.last), changes_text))
-    p.add_argument("--last", type=int, default=20, metavar="N", help="number of lines (default 20)")
-
-
-def _add_job(p: argparse.ArgumentParser, *, flag: bool = False) -> None:
-    text = "job id (default: the newest)"
-    if flag:  # for verbs whose positional arguments name tasks
-        p.add_argument("--job", default="", help=text)
-    else:
-        p.add_argument("job", nargs="?", default="", help=text)
+    verb("users", _users).add_argument("--slot-hours", type=float, metavar="H", help=text)
 
 
 def _job_of(farm: Farm, args: argparse.Namespace) -> str:

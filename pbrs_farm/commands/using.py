@@ -9,7 +9,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Final
 
 from pbrs_farm.commands.arguments import (
-    VIEW,
     Verb,
     at_least,
     echo,
@@ -34,41 +33,13 @@ _UNFINISHED: Final = 3
 
 def add_verbs(verb: Verb) -> None:
     """Add sheet, verify, relight and pull."""
-    p = verb("sheet", _sheet)
-    p.add_argument("folder", type=Path, help="output folder")
-    p.add_argument("--views", type=int, default=24, help="rows of the contact sheet (default 24)")
-    text = "also write videos of sequences: <house>.mp4, and <house>_labels.mp4 with labels"
-    p.add_argument("--video", action="store_true", help=text)
-
-    p = verb("verify", _verify)
-    add = p.add_argument
-    add("folder", metavar="ROOT", nargs="?", help="output folder or s3://bucket/prefix")
-    text = (
-        "also trace the folder's light again, small, and compare; without a folder: check the renderer,"
-        " in under a minute: furnace rooms, Metropolis against path"
-    )
-    add("--light", action="store_true", help=text)
-    add("--all", action="store_true", help="check every pixel instead of a sample")
-    add("--sample", type=int, metavar="N", help="pixels per view")
-    add("--json", action="store_true", help="print JSON")
-
-    p = verb("relight", _relight)
-    add = p.add_argument
-    add("view", help=f"{VIEW}, or its URL in a store")
-    add("--indoor", default="1", metavar="F", help="factor of the lamps, F or R,G,B (default 1)")
-    add("--outdoor", default="1", metavar="F", help="factor of the sky, F or R,G,B (default 1)")
-    text = (
-        "factor F, or R,G,B, of a lamp, repeatable; LAMP is its number, item or name from --list,"
-        " or a pattern with *; needs a view rendered with --groups lamps"
-    )
-    add("--lamp", action="append", default=[], metavar="LAMP=F", help=text)
-    add("--list", action="store_true", help="list the view's lamps and exit")
-    add("--out", type=Path, help="PNG file (default ./VIEW_relit.png)")
-    add("--no-denoise", action="store_true", help="use the raw radiance")
-
-    p = verb("pull", _pull)
-    p.add_argument("root", metavar="ROOT", help="s3://bucket/prefix, or a folder")
-    p.add_argument("--out", type=Path, required=True, help="folder for the files")
+    for name, handler in (
+        ("sheet", _sheet),
+        ("verify", _verify),
+        ("relight", _relight),
+        ("pull", _pull),
+    ):
+        verb(name, handler)
 
 
 def _pull(args: argparse.Namespace) -> None:

@@ -1,27 +1,17 @@
-import argparse
 import json
 from pathlib import Path
 
 import numpy as np
 import pytest
 
-from pbrs_farm.commands import labelling
+from pbrs_farm.cli import build_parser
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.images import png_from_array
 from tests.check.roots import SIZE, make_root
 
 
 def run(*words: str) -> int:
-    verbs = argparse.ArgumentParser().add_subparsers()
-
-    def verb(name, handler):  # type: ignore[no-untyped-def]
-        p = verbs.add_parser(name, help=name)
-        p.set_defaults(handler=handler)
-        return p
-
-    labelling.add_verbs(verb)
-    name, *rest = words
-    args = verbs.choices[name].parse_args(rest)
+    args = build_parser("labelling", words).parse_args(words)
     return int(args.handler(args) or 0)
 
 

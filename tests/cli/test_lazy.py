@@ -3,16 +3,21 @@
 from __future__ import annotations
 
 import argparse
+import csv
 import shlex
 import subprocess
 import sys
 from collections.abc import Iterator
+from importlib import resources
 from typing import Any
 
 import pytest
 
 from pbrs_farm.cli import MODULES, build_parser, first_screen
 from pbrs_farm.commands.command_line import VERBS
+from pbrs_farm.commands.completion_scripts import SHELLS
+from pbrs_farm.study.training_plan import TASKS
+from workers.ids import LEAST_URGENT
 
 HEAVY = "mitsuba drjit moderngl OpenImageIO celery kombu numpy scipy pydantic obstore"
 
@@ -25,6 +30,26 @@ def verbs_of(parser: argparse.ArgumentParser) -> list[str]:
 @pytest.mark.parametrize("module", MODULES)
 def test_the_table_names_the_verbs_each_module_adds(module: str) -> None:
     assert sorted(verbs_of(build_parser(module))) == sorted(MODULES[module])
+
+
+def test_choices_in_the_table_of_arguments_are_those_of_the_code() -> None:
+    verbs = build_parser().verbs()
+
+    def choices(verb: str, option: str) -> list[Any]:
+        (action,) = [a for a in verbs[verb]._actions if a.dest == option]
+        return list(action.choices or ())
+
+    for verb in ("train", "evaluate", "predict", "ablation"):
+        assert choices(verb, "task") == list(TASKS)
+    assert choices("completion", "shell") == list(SHELLS)
+    assert choices("priority", "number") == list(range(LEAST_URGENT + 1))
+
+
+def test_each_row_of_the_table_of_arguments_is_of_a_verb() -> None:
+    lines = (resources.files("pbrs_farm.commands") / "arguments.csv").read_text("utf-8")
+    rows = list(csv.reader(lines.splitlines()[2:]))
+    named = {verb for row in rows for verb in row[0].split()}
+    assert named <= {*VERBS, "homes:make"}
 
 
 def test_the_help_names_every_verb() -> None:

@@ -38,18 +38,12 @@ import argparse
 from pbrs_farm.commands.job_file import submit_arguments
 from pbrs_farm.commands.options import request_from
 from pbrs_farm.commands.submitting import _spec
-from pbrs_farm.cli import MODULES
-from pbrs_farm.commands import making, submitting
+from pbrs_farm.cli import MODULES, build_parser
+from pbrs_farm.commands import making
 from pbrs_farm.run.request import Wanted, wanted_of
 from workers.job import JobSpec, SubmitRequest
 
-parsers = {}
-
-def verb(name, handler):
-    return parsers.setdefault(name, argparse.ArgumentParser(name))
-
-making.add_verbs(verb)
-submitting.add_verbs(verb)
+parsers = build_parser("making").verbs() | build_parser("submitting").verbs()
 run = making._described(parsers["run"].parse_args(
     ["builtin", "--out", "o", "--dogs", "3", "--step-timeout", "5"], argparse.Namespace(debug=False)
 ), ["builtin"], ())
