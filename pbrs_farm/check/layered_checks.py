@@ -51,7 +51,7 @@ def check_depth_layers(case: ViewCase) -> None:
         return
     rows, columns = case.pixels
     if not len(case.now.triangles.faces):
-        case.tally.pixels(check, case.place, ~case.arrays["depth_layers"].any(2))
+        case.tally.pixels(check, case.place, np.asarray(~case.arrays["depth_layers"].any(2)))
         return
     stored = _Surfaces(*(case.arrays[name][rows, columns].astype(np.float64) for name in _LAYERS))
     origin, directions = case.view.rays(rows, columns)
@@ -63,13 +63,13 @@ def check_depth_layers(case: ViewCase) -> None:
         right[k] = _explained(case, stored.some(k), faces, origin, directions[k])
         if (dx, dy) == (0, 0):
             ties = ~right
-    for k in np.nonzero(~right)[0][:_MOST_TRIED]:
+    for one in np.nonzero(~right)[0][:_MOST_TRIED, None]:
+        k = one[0]
         faces = _pierced_faces(case, stored.instance[k], origin, directions[k])
-        one = np.array([k])
         right[one] = _explained(case, stored.some(one), faces[None], origin, directions[one])
     case.tally.add(check, len(rows), ties=int((ties & right).sum()))
-    for k in np.nonzero(~right)[0]:
-        case.tally.fail(check, case.place, f"row {rows[k]}, column {columns[k]}")
+    for row, column in zip(rows[~right], columns[~right], strict=True):
+        case.tally.fail(check, case.place, f"row {row}, column {column}")
 
 
 def _crossed_faces(rays: Hits, origin: F64, directions: F64) -> I64:

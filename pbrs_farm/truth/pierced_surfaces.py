@@ -63,9 +63,8 @@ def pierced_surfaces(
         last = np.where(is_new, t, last)
         begin = np.where(is_new, last, np.maximum(begin, t)) + apart
         remains = (met >= 0) & (n < MOST_SURFACES)
-        pixels, d, apart, last, begin, n = (
-            values[remains] for values in (pixels, d, apart, last, begin, n)
-        )
+        pixels, n, d = pixels[remains], n[remains], d[remains]
+        apart, last, begin = apart[remains], last[remains], begin[remains]
     item = np.zeros(shape, np.uint32)
     item[face >= 0] = geometry.face_item[face[face >= 0]]
     return PiercedSurfaces(face, item, depth)

@@ -101,7 +101,7 @@ def with_wholes(
         parts = [united.pop(p) for p in whole.parts if p in united]
         if not parts:
             continue
-        own_from_world = np.linalg.inv(whole.world_from_product)
+        own_from_world = np.asarray(np.linalg.inv(whole.world_from_product))
         positions = [transform_points(own_from_world, p.world) for p in parts]
         points = np.cumsum([0, *(len(p.positions) for p in parts)])
         styles = np.cumsum([0, *(len(p.styles) for p in parts)])
