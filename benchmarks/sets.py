@@ -25,6 +25,8 @@ from benchmarks.stream_wait import stream_figures
 from pbrs_farm.check.question_answers import wrong_answers
 from pbrs_farm.curate.teaching_rules import REASONS, judged_by
 from pbrs_farm.export.export_views import finished_entries
+from tests.core.lenses.opencv_points import error_px
+from tests.inputs.layered_homes import wrong_pixels
 
 UNITS: Final = {
     "sets.forms": "forms of views read back equal by code of its own",
@@ -36,6 +38,8 @@ UNITS: Final = {
     "sets.blind_best": "largest share of right answers by always giving the same one of four",
     "sets.blind": "score of the best blind answer, by type",
     **UNITS_OF_STREAM,
+    "layers.depth_layers_wrong": "pixels of panes, a box of glass and a wall whose surfaces along the ray are not those of the closed form",
+    "lens.error_px": "largest distance of 40 points from the pixels of cv2.projectPoints, and of these found again",
     "sets.curated": "views that each rule of `select --by` leaves out of the pictures and walks of the questions",
 }
 _PICTURES: Final = "made:70101..70104"
@@ -93,6 +97,8 @@ def main() -> None:
         "sets.forms_written": len(READ_BACK),
         "sets.forms_wrong": wrong,
         **figures_of_sets,
+        "layers.depth_layers_wrong": wrong_pixels(),
+        "lens.error_px": max(error_px()),
     }
     write_report("sets", figures, UNITS)
 

@@ -75,7 +75,7 @@ def _check_camera_row(case: ViewCase) -> None:
     k = [[fx * x, 0, cx * x], [0, fy * y, cy * y], [0, 0, 1]]
     judge("camera file", case.place, tally, view=view.table, row=row, K=k)
     if view.lens is not None:
-        depth = "planar" if view.lens.model == "radtan" else "distance"
+        depth = "planar" if view.lens.model in ("radtan", "opencv") else "distance"
         judge("camera depth", case.place, tally, view=view.table, lens=view.lens, depth=depth)
     if house.recipe:
         judge("view size", case.place, tally, view=view.table, image=house.recipe["image"])

@@ -1,7 +1,7 @@
 """Rays and projections of lenses, written again for `verify` from the published formulas; no effects.
 
-Shares no code with the stages. OpenCV's documentation gives radtan and fisheye; both are inverted by
-bisection of the radius and by fixed-point steps for the tangential part.
+Shares no code with the stages. OpenCV's documentation gives radtan, opencv and fisheye; they are inverted by
+bisection of the radius and by fixed-point steps for the tangential and prism parts.
 """
 
 from __future__ import annotations
@@ -13,7 +13,9 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 
+_BENT = ("radtan", "opencv")  # pinholes with distortion
 _HALVINGS = 60
+_FARTHEST_FOLD = 50.0  # radius at z = 1, within which a fold is looked for
 _STEPS = 200  # of the fixed point; a third of a pixel of tangential part needs few
 
 
@@ -25,22 +27,34 @@ class StoredLens:
     k: tuple[float, ...]  # radial: k1 k2 k3, of a fisheye k1 k2 k3 k4
     p: tuple[float, float]  # tangential
     limit: float  # largest angle in rad
+    divisor: tuple[float, ...] = ()  # opencv: k4 k5 k6
+    prism: tuple[float, ...] = (0.0,) * 4  # s1 s2 s3 s4
+    tau: tuple[float, float] = (0.0, 0.0)  # tilt, rad
 
     @staticmethod
     def of(table: dict[str, Any]) -> StoredLens:
         """From view.json; KeyError or ValueError for an unknown lens. Views of a pinhole have no table."""
         model = table["model"]
-        if model not in ("radtan", "fisheye", "equirect", "cubemap"):
+        if model not in (*_BENT, "fisheye", "equirect", "cubemap"):
             raise ValueError(f"no lens model {model!r}")
-        names = {"radtan": ("k1", "k2", "k3"), "fisheye": ("k1", "k2", "k3", "k4")}.get(model, ())
-        p = (float(table["p1"]), float(table["p2"])) if model == "radtan" else (0.0, 0.0)
-        k = tuple(float(table[name]) for name in names)
-        return StoredLens(model, k, p, float(table.get("max_angle_rad", np.pi)))
+
+        def numbers(*names: str) -> tuple[float, ...]:
+            return tuple(float(table[name]) for name in names)
+
+        radial = ("k1", "k2", "k3", "k4")[: {"fisheye": 4, "radtan": 3, "opencv": 3}.get(model, 0)]
+        k = numbers(*radial)
+        p = numbers("p1", "p2") if model in _BENT else (0.0, 0.0)
+        limit = float(table.get("max_angle_rad", np.pi))
+        if model != "opencv":
+            return StoredLens(model, k, (p[0], p[1]), limit)
+        tau_x, tau_y = numbers("tau_x", "tau_y")
+        divisor, prism = numbers("k4", "k5", "k6"), numbers("s1", "s2", "s3", "s4")
+        return StoredLens(model, k, (p[0], p[1]), limit, divisor, prism, (tau_x, tau_y))
 
     def rays(self, plane: F64) -> F64:
         """(N, 3) directions with OpenCV's axes of points (N, 2) of the plane.
 
-        Of unit depth for radtan; of unit length for the others, whose depth is the distance.
+        Of unit depth for radtan and opencv; of unit length for the others, whose depth is the distance.
         (0, 0, 0) beyond the image circle of a fisheye.
         """
         if self.model == "equirect":
@@ -54,8 +68,10 @@ class StoredLens:
             return np.stack(parts, axis=1)
         if self.model == "cubemap":
             return _cube_rays(plane)
-        if self.model == "radtan":
-            ideal = self._undistorted(plane)
+        if self.model in _BENT:
+            ideal = self._undistorted(
+                _through(plane, np.asarray(np.linalg.inv(self._tilt()), np.float64))
+            )
             return np.concatenate([ideal, np.ones((len(ideal), 1))], axis=1)
         # A fisheye: the angle whose radius is the point's, none beyond the image circle.
         radius = np.hypot(plane[:, 0], plane[:, 1])
@@ -69,7 +85,7 @@ class StoredLens:
     def plane_and_depth(self, points: F64) -> tuple[F64, F64]:
         """(N, 2) of the plane and (N,) depth of points (N, 3) in the camera's frame; NaN = not visible.
 
-        Depth is z for radtan and the distance for the others, as the layers store it.
+        Depth is z for radtan and opencv and the distance for the others, as the layers store it.
         """
         x, y, z = points.T
         distance = np.sqrt(x * x + y * y + z * z)
@@ -77,17 +93,24 @@ class StoredLens:
             return np.stack([np.arctan2(x, z), np.arcsin(y / distance)], axis=1), distance
         if self.model == "cubemap":
             return _cube_plane(points), distance
-        if self.model == "radtan":
+        if self.model in _BENT:
             depth = np.where(z > 0, z, np.nan)
-            return self._distorted(points[:, :2] / depth[:, None]), depth
+            ideal = points[:, :2] / depth[:, None]
+            fold = self._turn(_FARTHEST_FOLD)
+            beyond = (np.hypot(x, y) > fold * z) & (fold < _FARTHEST_FOLD)
+            ideal = np.where(beyond[:, None], np.nan, ideal)
+            return _through(self._distorted(ideal), self._tilt()), depth
         angle, turn = np.arccos(z / distance), np.arctan2(y, x)
         radius = np.where(angle <= self._turn(self.limit), self._radial(angle), np.nan)
         return np.stack([radius * np.cos(turn), radius * np.sin(turn)], axis=1), distance
 
     def _radial(self, r: F64) -> F64:
-        """r (1 + k1 r^2 + k2 r^4 + ...)."""
-        powers = [k * r ** (2 * n) for n, k in enumerate(self.k, start=1)]
-        return np.asarray(r * (1 + np.sum(powers, axis=0)))
+        """r (1 + k1 r^2 + k2 r^4 + ...), of opencv over (1 + k4 r^2 + ...)."""
+        over, under = (
+            1 + np.sum([k * r ** (2 * n) for n, k in enumerate(ks, start=1)], axis=0)
+            for ks in (self.k, self.divisor)
+        )
+        return np.asarray(r * over / under)
 
     def _turn(self, most: float) -> float:
         """Where _radial stops growing in 0..most; most where it never does."""
@@ -107,9 +130,18 @@ class StoredLens:
     def _tangential(self, x: F64, y: F64) -> F64:
         p1, p2 = self.p
         r2 = x * x + y * y
-        across = 2 * p1 * x * y + p2 * (r2 + 2 * x * x)
-        down = p1 * (r2 + 2 * y * y) + 2 * p2 * x * y
+        s1, s2, s3, s4 = self.prism
+        across = 2 * p1 * x * y + p2 * (r2 + 2 * x * x) + s1 * r2 + s2 * r2**2
+        down = p1 * (r2 + 2 * y * y) + 2 * p2 * x * y + s3 * r2 + s4 * r2**2
         return np.stack([across, down], axis=1)
+
+    def _tilt(self) -> F64:
+        """(3, 3) from the plane to that of a sensor turned about x, then y."""
+        (cx, cy), (sx, sy) = np.cos(self.tau), np.sin(self.tau)
+        about_x = np.array([[1, 0, 0], [0, cx, sx], [0, -sx, cx]])
+        turn = np.array([[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]]) @ about_x
+        flat = np.array([[turn[2, 2], 0, -turn[0, 2]], [0, turn[2, 2], -turn[1, 2]], [0, 0, 1]])
+        return np.asarray(flat @ turn)
 
     def _distorted(self, ideal: F64) -> F64:
         r = np.hypot(ideal[:, 0], ideal[:, 1])
@@ -129,6 +161,13 @@ class StoredLens:
             if np.abs(ideal - before).max(initial=0.0) < 1e-12:
                 break
         return ideal
+
+
+def _through(plane: F64, homography: F64) -> F64:
+    """(N, 2) points at z = 1 on another plane; NaN behind it."""
+    x, y, z = homography @ np.column_stack([plane, np.ones(len(plane))]).T
+    z = np.where(z > 0, z, np.nan)
+    return np.stack([x / z, y / z], axis=1)
 
 
 def _cube_rays(plane: F64) -> F64:

@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
@@ -18,7 +19,7 @@ from pbrs_farm.core.arrays import F32, F64, Mask, Matrix4
 from pbrs_farm.core.checked_calls import Size, Vector, checked_call
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.frames import OPENCV_FROM_OPENGL, affine
-from pbrs_farm.core.lenses import PINHOLE, Lens
+from pbrs_farm.core.lenses import COEFFICIENTS, PINHOLE, Lens, lens_of_opencv
 from pbrs_farm.core.pinhole_faces import PinholeFaces, faces_of_directions
 from pbrs_farm.core.shot import Shot
 
@@ -28,6 +29,7 @@ PAPER_HFOV_RAD = 2 * 0.5534
 DEFAULT_SIZE: Final = (640, 480)
 """Width and height of pictures, pixels: of recipes that say none."""
 
+_BORDER_POINTS: Final = 65  # of each side of a picture, where a fold is looked for
 _OTHER_SIZE: Final = 0.2  # maximum offset of a principal point from the middle, share of the size
 _SAME_SHARE: Final = 0.1  # tolerance between two equal shares
 
@@ -83,14 +85,19 @@ class Intrinsics:
         )
 
 
-def intrinsics_from_k(size: tuple[int, int] | None, k: Any, hfov_deg: float) -> Intrinsics:
+def intrinsics_from_k(
+    size: tuple[int, int] | None, k: Any, hfov_deg: float, distortion: Sequence[float] = ()
+) -> Intrinsics:
     """Intrinsics of a picture of (width, height) from K (3, 3), or from a field of view.
 
     size: None = DEFAULT_SIZE, with a field of view alone. With K the field of view is ignored; without
     it pixels are square and hfov_deg is between 0 and 175. Raises BadInput for a size below 1 pixel, for
     such a field of view, for a K that is not (3, 3) finite numbers or has a skew or a focal length that is
-    not positive, and for a K of another picture size. The lens is a pinhole.
+    not positive, and for a K of another picture size. distortion: as of `lens_of_opencv`; a lens that folds the
+    picture raises BadInput, too.
     """
+    if len(distortion):
+        return distorted_intrinsics(intrinsics_from_k(size, k, hfov_deg), distortion)
     if size is None and k is not None:
         raise BadInput("camera", "size", "is missing", hint="the picture size for K")
     width, height = (int(v) for v in (DEFAULT_SIZE if size is None else size))
@@ -107,6 +114,41 @@ def intrinsics_from_k(size: tuple[int, int] | None, k: Any, hfov_deg: float) -> 
     fx, fy, cx, cy = (float(matrix[place]) for place in ((0, 0), (1, 1), (0, 2), (1, 2)))
     _check_size_of_k(width, height, cx, cy)
     return Intrinsics(width, height, fx, fy, cx, cy)
+
+
+def distorted_intrinsics(pinhole: Intrinsics, distortion: Sequence[float]) -> Intrinsics:
+    """The intrinsics with OpenCV's coefficients; BadInput for a wrong number of them, or for a fold."""
+    try:
+        intrinsics = replace(pinhole, lens=lens_of_opencv(distortion))
+    except ValueError as error:
+        raise BadInput("camera", "distortion", str(error)) from None
+    fold = fold_of(intrinsics)
+    if fold is not None:
+        raise BadInput("camera", "distortion", fold)
+    return intrinsics
+
+
+def fold_of(i: Intrinsics) -> str | None:
+    """Where the distortion folds the picture inside its frame, in words; None where it does not."""
+    if i.lens.model != "fisheye" and not i.lens.bends_lines:
+        return None
+    # Look along the border: a fold moves inwards from there.
+    side = np.linspace(0.0, 1.0, _BORDER_POINTS)
+    zero, ones = np.zeros_like(side), np.ones_like(side)
+    x, y = np.concatenate([side, side, zero, ones]), np.concatenate([zero, ones, side, side])
+    border = np.stack([x * i.width_px, y * i.height_px], axis=1)
+    lost = ~i.directions(border).any(1)
+    # Beyond a fisheye's image circle nothing is lost that the lens had.
+    angle = i.lens.largest_angle_rad
+    is_circle = i.lens.model == "fisheye" and angle == i.lens.max_angle_rad
+    if is_circle or not lost.any():
+        return None
+    u, v = border[lost][0]
+    names = " ".join(COEFFICIENTS[i.lens.model])
+    where = f"no ray falls on its point ({u:.0f}, {v:.0f}) of {i.width_px}x{i.height_px}"
+    more = ", or lens.max_angle_deg below it" if i.lens.model == "fisheye" else ""
+    hint = f"give other {names}, a larger lens.fx{more}"
+    return f"the distortion folds the picture at {math.degrees(angle):.1f} degrees: {where}; {hint}"
 
 
 def _check_size_of_k(width: int, height: int, cx: float, cy: float) -> None:
@@ -192,12 +234,14 @@ class Camera:
         hfov_deg: float = 60.0,
         K: Any = None,
         up: Vector = (0.0, 1.0, 0.0),
+        distortion: Sequence[float] = (),
     ) -> Camera:
         """A camera at eye that looks at target, world metres, y up.
 
         size: (width, height) in pixels; default: that of the home's recipe. hfov_deg: full horizontal field
-        of view, unless K (3 x 3, pixels of the given size, x right, y down) is given. Raises BadInput for a
-        target at the eye, an up vector along the view, an invalid K or one of another size.
+        of view, unless K (3 x 3, pixels of the given size, x right, y down) is given. distortion: OpenCV's 4, 5, 8,
+        12 or 14 coefficients, k1 k2 p1 p2 k3 ... Raises BadInput for a target at the eye, an up vector along the
+        view, an invalid K or one of another size, a distortion that folds the picture.
 
             >>> Camera.look_at((1, 1.5, 2), (3, 1.5, 2), size=(640, 480), hfov_deg=70).towards.tolist()
             [1.0, 0.0, 0.0]
@@ -210,24 +254,31 @@ class Camera:
         ):
             raise BadInput("camera", "", "eye, target and up give no direction")
         x, y, z = (float(v) for v in up)
-        camera = Camera.look(intrinsics_from_k(size, K, hfov_deg), start, towards, (x, y, z))
+        camera = Camera.look(
+            intrinsics_from_k(size, K, hfov_deg, distortion), start, towards, (x, y, z)
+        )
         return replace(camera, has_own_size=size is not None)
 
     @staticmethod
     @checked_call
     def from_opencv(
-        world_from_camera: Any, K: Any = None, *, size: Size | None = None, hfov_deg: float = 60.0
+        world_from_camera: Any,
+        K: Any = None,
+        *,
+        size: Size | None = None,
+        hfov_deg: float = 60.0,
+        distortion: Sequence[float] = (),
     ) -> Camera:
         """A camera from a (4, 4) pose with OpenCV's axes: x right, y down, z forward; metres, y up.
 
-        size, hfov_deg and K as of look_at. Raises BadInput for a pose that is not rigid, an invalid K or one
-        of another size.
+        size, hfov_deg, K and distortion as of look_at. Raises BadInput for a pose that is not rigid, an invalid
+        K or one of another size, a distortion that folds the picture.
 
             >>> Camera.from_opencv(np.diag([1, -1, -1, 1]), size=(64, 48)).eye.tolist()
             [0.0, 0.0, 0.0]
         """
         pose = rigid_motion(world_from_camera, "camera", "world_from_camera")
-        intrinsics = intrinsics_from_k(size, K, hfov_deg)
+        intrinsics = intrinsics_from_k(size, K, hfov_deg, distortion)
         return Camera(intrinsics, pose @ OPENCV_FROM_OPENGL, has_own_size=size is not None)
 
     @property

@@ -1,11 +1,14 @@
-"""OpenCV's two models of distortion and their inverses; arrays in, arrays out, no effects.
+"""OpenCV's models of distortion and their inverses; arrays in, arrays out, no effects.
 
-Radial-tangential (Brown 1966, Conrady 1919), k1 k2 p1 p2 k3: with a, b the undistorted point at z = 1
-and s = a a + b b its squared radius,
+With a, b the undistorted point at z = 1 and s = a a + b b its squared radius,
 
-    radial = 1 + k1 s + k2 s^2 + k3 s^3
-    x = a radial + 2 p1 a b + p2 (s + 2 a a)
-    y = b radial + p1 (s + 2 b b) + 2 p2 a b
+    radial = (1 + k1 s + k2 s^2 + k3 s^3) / (1 + k4 s + k5 s^2 + k6 s^3)
+    x = a radial + 2 p1 a b + p2 (s + 2 a a) + s1 s + s2 s^2
+    y = b radial + p1 (s + 2 b b) + 2 p2 a b + s3 s + s4 s^2
+
+and then, where the sensor is tilted by tau_x and tau_y, a projection on its plane. With k1 k2 p1 p2 k3 alone it is the
+radial-tangential model (Brown 1966, Conrady 1919); OpenCV's 4, 5, 8, 12 and 14 numbers are the first ones of
+COEFFICIENTS["opencv"] in core/lenses.py, the rest is 0.
 
 Fisheye (Kannala and Brandt 2006), k1 k2 k3 k4: a direction at the angle t from the axis falls, on its
 own side of the axis, at the radius r = t (1 + k1 t^2 + k2 t^4 + k3 t^6 + k4 t^8). With k = 0 it is the
@@ -15,9 +18,10 @@ equidistant fisheye.
 from __future__ import annotations
 
 import math
-from typing import Final
+from typing import Final, NamedTuple
 
 import numpy as np
+from numpy.polynomial import Polynomial
 
 from pbrs_farm.core.arrays import F64
 
@@ -28,80 +32,144 @@ _STEPS: Final = 30
 _RESIDUAL: Final = 1e-10  # of a solution, at z = 1: a ten-millionth of a pixel
 
 
-def distorted(points: F64, coefficients: Coefficients) -> F64:
-    """(N, 2) distorted points of undistorted points (N, 2) at z = 1, by Brown's model (head of this module).
+class _Terms(NamedTuple):
+    """The coefficients of OpenCV's model; shorter ones end with zeros."""
 
-    Coefficients: (k1, k2, p1, p2, k3), OpenCV's order. Beyond `largest_radius` it folds back: callers
-    leave such points out.
+    k1: float
+    k2: float
+    p1: float
+    p2: float
+    k3: float = 0.0
+    k4: float = 0.0
+    k5: float = 0.0
+    k6: float = 0.0
+    s1: float = 0.0
+    s2: float = 0.0
+    s3: float = 0.0
+    s4: float = 0.0
+    tau_x: float = 0.0
+    tau_y: float = 0.0
+
+    def radial(self, s: F64) -> tuple[F64, F64]:
+        """(N,) the factor at squared radii s (N,), and its derivative by s."""
+        over = 1 + s * (self.k1 + s * (self.k2 + s * self.k3))
+        under = 1 + s * (self.k4 + s * (self.k5 + s * self.k6))
+        over_slope = self.k1 + s * (2 * self.k2 + s * 3 * self.k3)
+        under_slope = self.k4 + s * (2 * self.k5 + s * 3 * self.k6)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            factor = over / under
+            return factor, np.asarray((over_slope - factor * under_slope) / under)
+
+    def tilt(self) -> F64 | None:
+        """(3, 3) projection on the tilted sensor; None if it is not tilted."""
+        if self.tau_x == self.tau_y == 0:
+            return None
+        cx, sx, cy, sy = (f(v) for v in (self.tau_x, self.tau_y) for f in (math.cos, math.sin))
+        turn = np.array([[cy, 0, -sy], [0, 1, 0], [sy, 0, cy]]) @ [
+            [1, 0, 0],
+            [0, cx, sx],
+            [0, -sx, cx],
+        ]
+        z = turn[2, 2]
+        return np.asarray([[z, 0, -turn[0, 2]], [0, z, -turn[1, 2]], [0, 0, 1]] @ turn)
+
+
+def distorted(points: F64, coefficients: Coefficients) -> F64:
+    """(N, 2) distorted points of undistorted points (N, 2) at z = 1, by OpenCV's model (head of this module).
+
+    Coefficients: the first 4, 5, 8, 12 or 14 in OpenCV's order, (k1, k2, p1, p2, k3, ...); tau_x, tau_y in rad.
+    Beyond `largest_radius` it folds back: callers leave such points out.
+
+        >>> distorted(np.array([[0.5, 0.0]]), (0.2, 0.0, 0.0, 0.0)).round(4).tolist()
+        [[0.525, 0.0]]
     """
-    k1, k2, p1, p2, k3 = coefficients
-    a, b = points[:, 0], points[:, 1]
+    terms = _Terms(*coefficients)
+    flat, tilt = _on_upright_sensor(points, terms), terms.tilt()
+    return flat if tilt is None else _projected(flat, tilt)
+
+
+def _on_upright_sensor(points: F64, terms: _Terms) -> F64:
+    p1, p2, a, b = terms.p1, terms.p2, points[:, 0], points[:, 1]
     s = a * a + b * b
-    radial = 1 + s * (k1 + s * (k2 + s * k3))
-    x = a * radial + 2 * p1 * a * b + p2 * (s + 2 * a * a)
-    y = b * radial + p1 * (s + 2 * b * b) + 2 * p2 * a * b
+    radial, _slope = terms.radial(s)
+    x = a * radial + 2 * p1 * a * b + p2 * (s + 2 * a * a) + s * (terms.s1 + s * terms.s2)
+    y = b * radial + p1 * (s + 2 * b * b) + 2 * p2 * a * b + s * (terms.s3 + s * terms.s4)
     return np.stack([x, y], axis=1)
+
+
+def _projected(points: F64, matrix: F64) -> F64:
+    """(N, 2) points at z = 1 by a homography (3, 3); NaN behind it."""
+    moved = points @ matrix[:, :2].T + matrix[:, 2]
+    with np.errstate(divide="ignore", invalid="ignore"):
+        return np.where(moved[:, 2:] > 0, moved[:, :2] / moved[:, 2:], np.nan)
 
 
 def undistorted(points: F64, coefficients: Coefficients) -> F64:
     """(N, 2) the inverse of distorted, by Newton's method; NaN without a solution.
 
-    Coefficients as of `distorted`. NaN if Newton's method leaves a residual, the Jacobian is not positive
-    definite, or the solution is beyond `largest_radius`: no ray meets such a point. N may be 0.
+    Coefficients as of `distorted`. NaN if Newton's method leaves a residual, the Jacobian has no positive
+    determinant, or the solution is beyond `largest_radius`: no ray meets such a point. N may be 0.
+
+        >>> undistorted(np.array([[0.525, 0.0]]), (0.2, 0.0, 0.0, 0.0)).round(9).tolist()
+        [[0.5, 0.0]]
     """
     if not len(points):
         return points.copy()
+    terms = _Terms(*coefficients)
+    tilt = terms.tilt()
+    if tilt is not None:
+        points = _projected(points, np.asarray(np.linalg.inv(tilt), np.float64))
     # Start at the radius that the radial part alone maps to the point's.
     radius = np.linalg.norm(points, axis=1)
     start = _radius_before(radius, coefficients)
     scale = np.divide(start, radius, out=np.ones_like(radius), where=radius > 0)
     solution = points * scale[:, None]
-    # Solve both components; the Jacobian is symmetric.
     for _ in range(_STEPS):
-        error = distorted(solution, coefficients) - points
-        xx, xy, yy = jacobian(solution, coefficients)
-        determinant = xx * yy - xy * xy
+        error = _on_upright_sensor(solution, terms) - points
+        xx, xy, yx, yy = _jacobian(solution, terms)
+        determinant = xx * yy - xy * yx
         inverse = np.divide(
             1.0, determinant, out=np.zeros_like(determinant), where=np.abs(determinant) > 1e-12
         )
         step_x = (yy * error[:, 0] - xy * error[:, 1]) * inverse
-        step_y = (xx * error[:, 1] - xy * error[:, 0]) * inverse
+        step_y = (xx * error[:, 1] - yx * error[:, 0]) * inverse
         solution = solution - np.stack([step_x, step_y], axis=1)
         if max(np.abs(step_x).max(), np.abs(step_y).max()) < 1e-15:
             break
     # A point beyond the fold is another point's picture, turned inside out.
-    error = np.abs(distorted(solution, coefficients) - points).max(1)
-    xx, xy, yy = jacobian(solution, coefficients)
+    error = np.abs(_on_upright_sensor(solution, terms) - points).max(1)
+    xx, xy, yx, yy = _jacobian(solution, terms)
     within = np.linalg.norm(solution, axis=1) <= largest_radius(coefficients)
-    good = (error < _RESIDUAL) & (xx > 0) & (xx * yy > xy * xy) & within
+    good = (error < _RESIDUAL) & (xx > 0) & (xx * yy > xy * yx) & within
     return np.where(good[:, None], solution, np.nan)
 
 
-def jacobian(points: F64, coefficients: Coefficients) -> tuple[F64, F64, F64]:
-    """dx/da, dx/db = dy/da and dy/db of distorted at (N, 2) points.
-
-    Three (N,) float64 arrays, as the matrix is symmetric; coefficients as of `distorted`.
-    `undistorted` takes a solution only where it is positive definite.
-    """
-    k1, k2, p1, p2, k3 = coefficients
-    a, b = points[:, 0], points[:, 1]
+def _jacobian(points: F64, terms: _Terms) -> tuple[F64, F64, F64, F64]:
+    """dx/da, dx/db, dy/da and dy/db, each (N,), before a tilt, at points (N, 2)."""
+    p1, p2, a, b = terms.p1, terms.p2, points[:, 0], points[:, 1]
     s = a * a + b * b
-    radial = 1 + s * (k1 + s * (k2 + s * k3))
-    slope = k1 + s * (2 * k2 + s * 3 * k3)
-    xx = radial + 2 * a * a * slope + 2 * p1 * b + 6 * p2 * a
-    xy = 2 * a * b * slope + 2 * p1 * a + 2 * p2 * b
-    yy = radial + 2 * b * b * slope + 6 * p1 * b + 2 * p2 * a
-    return xx, xy, yy
+    radial, slope = terms.radial(s)
+    prism_x, prism_y = terms.s1 + 2 * s * terms.s2, terms.s3 + 2 * s * terms.s4
+    across = 2 * a * b * slope + 2 * p1 * a + 2 * p2 * b
+    xx = radial + 2 * a * a * slope + 2 * p1 * b + 6 * p2 * a + 2 * a * prism_x
+    yy = radial + 2 * b * b * slope + 6 * p1 * b + 2 * p2 * a + 2 * b * prism_y
+    return xx, across + 2 * b * prism_x, across + 2 * a * prism_y, yy
 
 
 def largest_radius(coefficients: Coefficients) -> float:
-    """The radius at z = 1 where the radial part begins to decrease; inf if it never does.
+    """The radius at z = 1 where the radial part begins to decrease or has a pole; inf if it never does.
 
-    Only k1, k2 and k3 count, so with strong tangential terms the fold differs a little: `undistorted` also
+    Only k1 to k6 count, so with strong other terms the fold differs a little: `undistorted` also
     checks the Jacobian.
     """
-    k1, k2, _p1, _p2, k3 = coefficients
-    return math.sqrt(first_root((1.0, 3 * k1, 5 * k2, 7 * k3)))
+    t = _Terms(*coefficients)
+    growth = (1.0, 3 * t.k1, 5 * t.k2, 7 * t.k3)
+    if not any((t.k4, t.k5, t.k6)):
+        return math.sqrt(first_root(growth))
+    over, under = Polynomial([1, t.k1, t.k2, t.k3]), Polynomial([1, t.k4, t.k5, t.k6])
+    # The numerator of the derivative of r over(s) / under(s), s = r^2.
+    turning = Polynomial(growth) * under - 2 * Polynomial([0, 1]) * over * under.deriv()
+    return math.sqrt(min(first_root(tuple(p.coef)) for p in (turning, under)))
 
 
 def first_root(polynomial: tuple[float, ...]) -> float:
@@ -113,11 +181,10 @@ def first_root(polynomial: tuple[float, ...]) -> float:
 
 def _radius_before(radius: F64, coefficients: Coefficients) -> F64:
     """(N,) radii that the radial part maps to radius, interpolated; held to the largest."""
-    k1, k2, _p1, _p2, k3 = coefficients
+    terms = _Terms(*coefficients)
 
     def mapped(r: F64) -> F64:
-        s = r * r
-        return np.asarray(r * (1 + s * (k1 + s * (k2 + s * k3))))
+        return np.asarray(r * terms.radial(r * r)[0])
 
     # Cover the farthest point: a strong barrel needs more than its own radius.
     end, most = float(radius.max()), largest_radius(coefficients)

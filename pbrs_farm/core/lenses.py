@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any, Final, Literal
 
@@ -25,16 +25,35 @@ from pbrs_farm.core.panoramas import (
     equirect_of_directions,
 )
 
-LensModel = Literal["pinhole", "radtan", "fisheye", "equirect", "cubemap"]
+LensModel = Literal["pinhole", "radtan", "opencv", "fisheye", "equirect", "cubemap"]
 
 COEFFICIENTS: Final[Mapping[str, tuple[str, ...]]] = {
     "pinhole": (),
     "radtan": ("k1", "k2", "p1", "p2", "k3"),  # in OpenCV's order
+    "opencv": (
+        "k1",
+        "k2",
+        "p1",
+        "p2",
+        "k3",
+        "k4",
+        "k5",
+        "k6",
+        "s1",
+        "s2",
+        "s3",
+        "s4",
+        "tau_x",
+        "tau_y",
+    ),
     "fisheye": ("k1", "k2", "k3", "k4"),
     "equirect": (),
     "cubemap": (),
 }
 """Names of each model's coefficients."""
+
+_BROWN: Final = ("radtan", "opencv")
+_NUMBERS_OF_OPENCV: Final = (0, 4, 5, 8, 12, 14)
 
 
 @dataclass(frozen=True, slots=True)
@@ -58,7 +77,12 @@ class Lens:
     @property
     def depth_is_planar(self) -> bool:
         """True if depth is z; a model that sees more than half of all directions has the ray's distance."""
-        return self.model in ("pinhole", "radtan")
+        return self.model == "pinhole" or self.bends_lines
+
+    @property
+    def bends_lines(self) -> bool:
+        """A pinhole with distortion as OpenCV has it: radtan or opencv."""
+        return self.model in _BROWN
 
     @property
     def largest_angle_rad(self) -> float:
@@ -69,7 +93,7 @@ class Lens:
         """
         if self.model == "fisheye":
             return min(self.max_angle_rad, angle_of_fold(self.coefficients))
-        if self.model == "radtan":
+        if self.bends_lines:
             return math.atan(largest_radius(self.coefficients))
         return math.pi if self.is_panorama else math.pi / 2
 
@@ -85,7 +109,7 @@ class Lens:
         elif self.model == "cubemap":
             directions = directions_of_cubemap(plane)
         else:
-            ideal = undistorted(plane, self.coefficients) if self.model == "radtan" else plane
+            ideal = undistorted(plane, self.coefficients) if self.bends_lines else plane
             directions = np.concatenate([ideal, np.ones((len(plane), 1))], axis=1)
         return np.where(np.isfinite(directions).all(1, keepdims=True), directions, 0.0)
 
@@ -133,3 +157,21 @@ def lens_from_table(table: Mapping[str, Any]) -> Lens:
         raise ValueError(f"no lens model {model!r}")
     coefficients = tuple(float(table[name]) for name in COEFFICIENTS[model])
     return Lens(model, coefficients, float(table.get("max_angle_rad", math.pi)))
+
+
+def lens_of_opencv(numbers: Sequence[float]) -> Lens:
+    """The lens of OpenCV's distortion coefficients, in its order; a pinhole if all are 0.
+
+    numbers: 4, 5, 8, 12 or 14 (k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tau_x tau_y), of points at z = 1, tau in rad.
+    Raises ValueError for another number of them or one that is not finite.
+
+        >>> lens_of_opencv([-0.2, 0.03, 0.001, -0.002]).model
+        'radtan'
+    """
+    if len(numbers) not in _NUMBERS_OF_OPENCV or not all(map(math.isfinite, numbers)):
+        raise ValueError(f"expected 4, 5, 8, 12 or 14 finite numbers, got {list(numbers)}")
+    if not any(numbers):
+        return PINHOLE
+    model: LensModel = "opencv" if any(numbers[5:]) else "radtan"
+    padded = [*map(float, numbers), *([0.0] * _NUMBERS_OF_OPENCV[-1])]
+    return Lens(model, tuple(padded[: len(COEFFICIENTS[model])]))

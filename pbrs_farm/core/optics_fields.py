@@ -8,9 +8,9 @@ from pathlib import Path
 from typing import Annotated, Any, Final, Literal
 
 import numpy as np
-from pydantic import Field, model_validator
+from pydantic import Field, SerializerFunctionWrapHandler, model_serializer, model_validator
 
-from pbrs_farm.core.camera import Intrinsics
+from pbrs_farm.core.camera import Intrinsics, fold_of
 from pbrs_farm.core.distortion import radius_of_angle
 from pbrs_farm.core.lenses import COEFFICIENTS, Lens, LensModel
 from pbrs_farm.core.recipe_fields import FieldGroup, Share, field
@@ -50,11 +50,12 @@ class BlurFields(FieldGroup):
 
 _EQUIRECT_PX: Final = (1024, 512)  # of panoramas in cameras.json; pictures are scaled from it
 _CUBEMAP_PX: Final = (1536, 256)
-_BORDER_POINTS: Final = 65  # of each side of a picture, where a fold is looked for
 _ASPECT_ERROR: Final = 0.01  # of a picture's width, against the lens's own picture
 
 Pixels = Annotated[float, Field(ge=0, le=1e6)]
 Coefficient = Annotated[float, Field(ge=-1e3, le=1e3)]
+Tilt = Annotated[float, Field(ge=-1, le=1)]
+_OF_OPENCV: Final = ("k5", "k6", "s1", "s2", "s3", "s4", "tau_x", "tau_y")
 
 _PRESETS: Final = read_toml(
     Path(__file__).with_name("optics_presets.toml"), dict[str, dict[str, dict[str, Any]]]
@@ -81,12 +82,20 @@ class LensFields(FieldGroup):
     cx: Pixels = field(0.0, "px from the top left corner; 0 = the middle")
     cy: Pixels = 0.0
     hfov_deg: float = field(0.0, "fisheye without fx: horizontal field of view", 0, 360)
-    k1: Coefficient = field(0.0, "radtan and fisheye, as OpenCV has them")
+    k1: Coefficient = field(0.0, "radtan, opencv and fisheye, as OpenCV has them")
     k2: Coefficient = 0.0
     k3: Coefficient = 0.0
-    k4: Coefficient = field(0.0, "fisheye")
-    p1: Coefficient = field(0.0, "radtan, tangential")
+    k4: Coefficient = field(0.0, "fisheye; opencv: k4 to k6 of the divisor")
+    p1: Coefficient = field(0.0, "radtan and opencv, tangential")
     p2: Coefficient = 0.0
+    k5: Coefficient = 0.0
+    k6: Coefficient = 0.0
+    s1: Coefficient = field(0.0, "opencv, thin prism")
+    s2: Coefficient = 0.0
+    s3: Coefficient = 0.0
+    s4: Coefficient = 0.0
+    tau_x: Tilt = field(0.0, "opencv, tilt of the sensor, rad")
+    tau_y: Tilt = 0.0
     max_angle_deg: float = field(
         180.0, "fisheye: angle of the image circle from the axis; black beyond", high=180, above=0
     )
@@ -98,6 +107,11 @@ class LensFields(FieldGroup):
         preset = given.get("preset", "none") if isinstance(given, dict) else "none"
         preset_values = LENS_PRESETS.get(preset, {}) if isinstance(preset, str) else {}
         return {**preset_values, **given} if preset_values else given
+
+    @model_serializer(mode="wrap")
+    def _without_unused(self, fields: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        # Recipes of other lenses keep the digest that they had before these fields, and so their seeds.
+        return {k: v for k, v in fields(self).items() if v or k not in _OF_OPENCV}
 
     @property
     def lens(self) -> Lens:
@@ -119,9 +133,9 @@ class LensFields(FieldGroup):
 
         The text names the --set options that mend it. Panoramas have a fixed aspect (2:1, six faces
         in a row); a lens that states fx has that of the size it was calibrated at; any size fits a
-        pinhole or radtan lens without fx.
+        lens with planar depth without fx.
         """
-        if self.model in ("pinhole", "radtan") and self.fx == 0:
+        if self.lens.depth_is_planar and self.fx == 0:
             return None
         w, h = {"equirect": _EQUIRECT_PX, "cubemap": _CUBEMAP_PX}.get(
             self.model, (self.width_px, self.height_px)
@@ -155,29 +169,6 @@ class LensFields(FieldGroup):
         if not radius > 0:
             raise ValueError(f"the distortion folds the picture within {self.hfov_deg:g} degrees")
         return self.width_px / 2 / radius
-
-
-def fold_of(i: Intrinsics) -> str | None:
-    """Where the distortion folds the picture inside its frame, in words; None where it does not."""
-    if i.lens.model not in ("radtan", "fisheye"):
-        return None
-    # Look along the border: a fold moves inwards from there.
-    side = np.linspace(0.0, 1.0, _BORDER_POINTS)
-    zero, ones = np.zeros_like(side), np.ones_like(side)
-    x, y = np.concatenate([side, side, zero, ones]), np.concatenate([zero, ones, side, side])
-    border = np.stack([x * i.width_px, y * i.height_px], axis=1)
-    lost = ~i.directions(border).any(1)
-    # Beyond a fisheye's image circle nothing is lost that the lens had.
-    angle = i.lens.largest_angle_rad
-    is_circle = i.lens.model == "fisheye" and angle == i.lens.max_angle_rad
-    if is_circle or not lost.any():
-        return None
-    u, v = border[lost][0]
-    names = " ".join(COEFFICIENTS[i.lens.model])
-    where = f"no ray falls on its point ({u:.0f}, {v:.0f}) of {i.width_px}x{i.height_px}"
-    more = "" if i.lens.model == "radtan" else ", or lens.max_angle_deg below it"
-    hint = f"give other {names}, a larger lens.fx{more}"
-    return f"the distortion folds the picture at {math.degrees(angle):.1f} degrees: {where}; {hint}"
 
 
 class SensorFields(FieldGroup):

@@ -7,10 +7,11 @@ from typing import Annotated, Final
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, TypeAdapter, model_validator
 
-from pbrs_farm.core.camera import PAPER_HFOV_RAD, Camera, Intrinsics
+from pbrs_farm.core.camera import PAPER_HFOV_RAD, Camera, Intrinsics, distorted_intrinsics
 from pbrs_farm.core.checked_json import checked, exactly
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.frames import OPENCV_FROM_OPENGL, Y_UP_FROM_Z_UP
+from pbrs_farm.core.lenses import COEFFICIENTS
 from pbrs_farm.sample.room_camera_file import cameras_from_text
 
 Vector = Annotated[tuple[float, float, float], exactly(3)]
@@ -25,7 +26,7 @@ class GivenCamera(BaseModel):
 
     Metres, y up. world_from_camera has OpenGL axes (x right, y up, looking along -z), row by row;
     world_from_camera_opencv x right, y down, looking along z. K is of a picture of width_px by
-    height_px, and is scaled to the image's.
+    height_px, and is scaled to the image's. distortion: OpenCV's 4, 5, 8, 12 or 14 coefficients.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid", allow_inf_nan=False)
@@ -39,6 +40,7 @@ class GivenCamera(BaseModel):
     K: Annotated[tuple[Vector, Vector, Vector], exactly(3, "rows")] | None = None
     width_px: Annotated[int, Field(gt=0, le=16384)] | None = None  # of K's picture
     height_px: Annotated[int, Field(gt=0, le=16384)] | None = None
+    distortion: tuple[float, ...] = ()  # OpenCV's coefficients
 
     @model_validator(mode="after")
     def _has_one_pose(self) -> GivenCamera:
@@ -71,14 +73,18 @@ class GivenCamera(BaseModel):
                 raise ValueError("K is fx 0 cx, 0 fy cy, 0 0 1")
         return self
 
+    @model_validator(mode="after")
+    def _has_a_lens(self) -> GivenCamera:
+        try:
+            distorted_intrinsics(self._pinhole(640, 480), self.distortion)
+        except BadInput as error:
+            raise ValueError(f"distortion: {error.text}") from None
+        return self
+
     def camera(self, width_px: int, height_px: int) -> Camera:
         """On a grid of that size: K scaled, without skew, else the field of view with square pixels."""
-        if self.K is None or self.width_px is None or self.height_px is None:
-            intrinsics = Intrinsics.from_hfov(width_px, height_px, self.hfov_rad)
-        else:
-            (fx, _skew, cx), (_zero, fy, cy), _last = self.K
-            stored = Intrinsics(self.width_px, self.height_px, fx, fy, cx, cy)
-            intrinsics = stored.resized(width_px, height_px)
+        pinhole = self._pinhole(width_px, height_px)
+        intrinsics = distorted_intrinsics(pinhole, self.distortion) if self.distortion else pinhole
         if self.world_from_camera is not None:
             return Camera(intrinsics, np.array(self.world_from_camera, np.float64))
         if self.world_from_camera_opencv is not None:
@@ -88,8 +94,13 @@ class GivenCamera(BaseModel):
             intrinsics, np.array(self.eye, np.float64), np.array(self.towards, np.float64), self.up
         )
 
+    def _pinhole(self, width_px: int, height_px: int) -> Intrinsics:
+        if self.K is None or self.width_px is None or self.height_px is None:
+            return Intrinsics.from_hfov(width_px, height_px, self.hfov_rad)
+        (fx, _skew, cx), (_zero, fy, cy), _last = self.K
+        stored = Intrinsics(self.width_px, self.height_px, fx, fy, cx, cy)
+        return stored.resized(width_px, height_px)
 
-# y up  <-  z up, the world of transforms.json without applied_transform.
 
 _LEAST_DETERMINANT: Final = 1e-12
 _LENSES: Final = ("PINHOLE", "SIMPLE_PINHOLE", "OPENCV")
@@ -114,10 +125,10 @@ class _Optics(BaseModel):
     p2: float = 0.0
 
     @model_validator(mode="after")
-    def _is_pinhole(self) -> _Optics:
-        distortion = any((self.k1, self.k2, self.k3, self.k4, self.p1, self.p2))
-        if distortion or self.camera_model not in _LENSES:
-            raise ValueError("has a lens; lenses are chosen by --set optics, not by the file")
+    def _is_known(self) -> _Optics:
+        if self.camera_model not in _LENSES or self.k4:
+            text = f"has a lens other than {', '.join(_LENSES)} without k4"
+            raise ValueError(f"{text}; --set lens.model chooses one for all cameras")
         return self
 
 
@@ -152,7 +163,8 @@ class _Transforms(_Optics):
 
     def _view_of(self, frame: _Frame) -> dict[str, object]:
         """K and its size, else the field of view; a frame's own values come first."""
-        whole = self.model_dump(exclude_none=True) | frame.model_dump(exclude_none=True)
+        own, of_frame = (o.model_dump(exclude_none=True, exclude_unset=True) for o in (self, frame))
+        whole = own | of_frame
         w, h, fl_x = whole.get("w"), whole.get("h"), whole.get("fl_x")
         angle = whole.get("camera_angle_x")
         if w is None or h is None or fl_x is None:
@@ -161,7 +173,9 @@ class _Transforms(_Optics):
             [fl_x, 0, whole.get("cx", w / 2)],
             [0, whole.get("fl_y", fl_x), whole.get("cy", h / 2)],
         ]
-        return {"K": [*k, [0, 0, 1]], "width_px": w, "height_px": h}
+        distortion = [whole.get(name, 0.0) for name in COEFFICIENTS["radtan"]]
+        lens = {"distortion": distortion} if any(distortion) else {}
+        return {"K": [*k, [0, 0, 1]], "width_px": w, "height_px": h, **lens}
 
 
 _CAMERAS: TypeAdapter[list[GivenCamera]] = TypeAdapter(list[GivenCamera])

@@ -285,7 +285,9 @@ def check_lens(names: Collection[str], lens: Lens) -> None:
     for layer in (LAYER[name] for name in names if name in LAYER):
         if layer.needs == "planar depth" and not lens.depth_is_planar:
             text = f"needs depth along the axis, which lens.model {lens.model} has not"
-            raise BadInput("--layers", layer.name, text, hint="lens.model pinhole or radtan")
+            raise BadInput(
+                "--layers", layer.name, text, hint="lens.model pinhole, radtan or opencv"
+            )
         if layer.needs == "rows" and not lens.is_pinhole:
             text = f"needs rows that correspond, which lens.model {lens.model} has not"
             raise BadInput("--layers", layer.name, text, hint="lens.model pinhole")

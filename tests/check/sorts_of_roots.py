@@ -202,6 +202,9 @@ ROOTS: dict[str, Make] = {
                                  "tone.variants": "1", "image.width_px": "216", "image.height_px": "162"}, n_views=2, layers=()),
     "lens": rendered("builtin", {"lens.preset": "d455", "image.width_px": "212", "lens.cx": "380", "lens.fy": "460",
                                "materials.preset": "released"}, layers=()),
+    "a lens of fourteen numbers": rendered("builtin", {f"lens.{k}": v for k, v in {
+        "model": "opencv", "fx": "400", "k1": "-0.28", "k2": "0.07", "p1": "0.001", "k4": "0.02", "s1": "0.004", "s4": "0.001", "tau_x": "0.03", "tau_y": "-0.05",
+    }.items()}, layers=("albedo", "depth_layers", "depth_hole")),
     "edited": _edited,
     "opened": _opened,
     "generated": rendered("made:3", layers=("albedo", "normal_shading")),

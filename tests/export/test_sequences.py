@@ -3,12 +3,13 @@
 import json
 from pathlib import Path
 from types import SimpleNamespace
-from typing import cast
+from typing import Any, cast
 
 import numpy as np
 import pytest
 
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.lenses import lens_of_opencv
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.export.chosen_view import Choice, ChosenView, require_lens, resize_layer
 from pbrs_farm.export.export_views import export
@@ -196,13 +197,21 @@ def test_forms_name_the_lens_or_refuse_it() -> None:
     facts = {"width_px": 640, "height_px": 480, "K": [[500, 0, 320], [0, 501, 240], [0, 0, 1]]}
     radtan = {"model": "radtan", "k1": 0.1, "k2": 0.2, "p1": 0.3, "p2": 0.4, "k3": 0.5}
     cube = {"model": "cubemap"}
-    bent, strip = (
-        cast(ChosenView, SimpleNamespace(id="a", facts=facts | {"lens": lens}))
-        for lens in (radtan, cube)
-    )
+
+    def view_through(lens: dict[str, Any]) -> ChosenView:
+        return cast(ChosenView, SimpleNamespace(id="a", facts=facts | {"lens": lens}))
+
+    bent, strip = view_through(radtan), view_through(cube)
     assert (
         colmap_camera_line(bent) == "FULL_OPENCV 640 480 500 501 320 240 0.1 0.2 0.3 0.4 0.5 0 0 0"
     )
+    eight, twelve = (
+        lens_of_opencv([0.1, 0.2, 0.3, 0.4, 0.5, 0.6, 0.7, 0.8, *more]).table()
+        for more in ([], [0.9, 0, 0, 0])
+    )
+    assert colmap_camera_line(view_through(eight)).endswith("0.1 0.2 0.3 0.4 0.5 0.6 0.7 0.8")
+    with pytest.raises(BadInput, match=r"no prism \(s1 to s4\)"):
+        colmap_camera_line(view_through(twelve))
     for form, models in (("colmap", ("radtan", "fisheye")), ("kitti", ()), ("released", ())):
         with pytest.raises(BadInput, match=r"lens\.model cubemap"):
             require_lens(strip, form, *models)

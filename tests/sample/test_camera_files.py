@@ -9,6 +9,7 @@ import pytest
 
 from pbrs_farm.core.camera import PAPER_HFOV_RAD, Camera
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.lenses import Lens
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from pbrs_farm.sample.camera_file import cameras_from_file_text
 from pbrs_farm.sample.room_camera_file import cameras_from_text, with_names
@@ -46,6 +47,19 @@ def test_a_line_that_is_no_camera_is_rejected_with_its_number(line: str, reason:
     with pytest.raises(BadInput, match=reason) as caught:
         cameras_from_text(f"{LINE}\n{line}\n", "room_camera.txt", 640, 480)
     assert "room_camera.txt: line 2" in str(caught.value)
+
+
+def test_a_users_camera_has_opencvs_numbers_and_is_refused_where_they_fold() -> None:
+    row = {"eye": [1, 1.5, 2], "towards": [0, 0, -1], "distortion": [0.1, 0, 0, 0, 0, 0.05, 0, 0]}
+    ((camera, _room),) = cameras_from_file_text(json.dumps([row]), "cams.json", 320, 240)
+    assert camera.intrinsics.lens.model == "opencv"
+    for numbers, words in (
+        ([1, 2, 3], "4, 5, 8, 12 or 14"),
+        ([-1.5, 0, 0, 0], "folds the picture"),
+    ):
+        text = json.dumps([row | {"distortion": numbers}])
+        with pytest.raises(BadInput, match=f"cams.json: .*{words}"):
+            cameras_from_file_text(text, "cams.json", 320, 240)
 
 
 def test_a_users_file_gives_cameras_by_look_or_by_matrix() -> None:
@@ -160,8 +174,13 @@ def test_transforms_json_gives_the_cameras_before_its_transform() -> None:
             assert camera.intrinsics.cy == pytest.approx(125)
         else:
             assert camera.intrinsics.fx == pytest.approx(160 / math.tan(0.45))
-    with pytest.raises(BadInput, match="has a lens"):
-        cameras_from_file_text(json.dumps(published | {"k1": 0.1}), "transforms.json", 320, 240)
+    ((bent, _),) = cameras_from_file_text(
+        json.dumps(published | {"k1": 0.1, "p2": 0.01}), "transforms.json", 320, 240
+    )
+    assert bent.intrinsics.lens == Lens("radtan", (0.1, 0, 0, 0.01, 0))
+    for wrong in ({"k4": 0.1}, {"camera_model": "OPENCV_FISHEYE"}):
+        with pytest.raises(BadInput, match="has a lens other than PINHOLE"):
+            cameras_from_file_text(json.dumps(published | wrong), "transforms.json", 320, 240)
     flat = exported | {"applied_transform": [[0.0] * 4] * 3}
     with pytest.raises(BadInput, match=r"transforms.json: .*applied_transform is flat"):
         cameras_from_file_text(json.dumps(flat), "transforms.json", 320, 240)

@@ -10,6 +10,7 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of, require_lens
 from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.export.sequences import pose_opencv, required_picture
@@ -94,12 +95,15 @@ def _write_lines(file: Path, lines: Iterable[str]) -> None:
 def colmap_camera_line(view: ChosenView) -> str:
     require_lens(view, "colmap", *FORM.lenses)
     i = intrinsics_of(view.facts)
-    # FULL_OPENCV has k1 k2 p1 p2 k3 and three more, which are 0.
-    model, more = {
-        "radtan": ("FULL_OPENCV", (0.0, 0.0, 0.0)),
-        "fisheye": ("OPENCV_FISHEYE", ()),
-    }.get(i.lens.model, ("PINHOLE", ()))
-    numbers = (i.fx, i.fy, i.cx, i.cy, *i.lens.coefficients, *more)
+    # FULL_OPENCV has OpenCV's first eight numbers.
+    bent = i.lens.coefficients
+    if i.lens.bends_lines:
+        if any(bent[8:]):
+            text = "COLMAP's FULL_OPENCV has k1 to k6, p1 and p2, no prism (s1 to s4) and no tilt (tau)"
+            raise BadInput("--to colmap", view.id, text, hint="another --to")
+        bent = (*bent[:8], *([0.0] * (8 - len(bent))))
+    model = {8: "FULL_OPENCV", 4: "OPENCV_FISHEYE"}.get(len(bent), "PINHOLE")
+    numbers = (i.fx, i.fy, i.cx, i.cy, *bent)
     return f"{model} {i.width_px} {i.height_px} " + " ".join(f"{v:.9g}" for v in numbers)
 
 
@@ -138,6 +142,6 @@ FORM = ViewForm(
     "colmap",
     write_colmap,
     "a text model: cameras, images, points from depth; of a rig also rigs and frames",
-    lenses=("pinhole", "radtan", "fisheye"),
+    lenses=("pinhole", "radtan", "opencv", "fisheye"),
     convention=Convention(0.5, axes="camera x right, y down, z forward; the home's world, y up, m"),
 )

@@ -119,7 +119,7 @@ FORM = ViewForm(
     " `filename_list.txt` (`rgb depth`), `filename_list_normals.txt` (`rgb normal`); of views with `albedo`, `shading`, `residual` `filename_list_iid_lighting.txt`,"
     " with `albedo`, `roughness`, `metallic` `filename_list_iid_appearance.txt`; with `--split` `train/filename_list_train.txt`",
     finish=name_lists_by_split,
-    lenses=("pinhole", "radtan"),
+    lenses=("pinhole", "radtan", "opencv"),
     convention=Convention(
         None, axes="camera x right, y up, z backward", depth="mm, along the axis"
     ),

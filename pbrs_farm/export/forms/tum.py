@@ -78,7 +78,7 @@ FORM = ViewForm(
     write_tum,
     "`rgb.txt`, `depth.txt`, `groundtruth.txt`; depth 5000 a metre; the right views of pairs in"
     " `rgb_right.txt`, `depth_right.txt`, `groundtruth_right.txt`, other cameras of a rig likewise",
-    lenses=("pinhole", "radtan"),
+    lenses=("pinhole", "radtan", "opencv"),
     is_of_frames=True,
     convention=Convention(
         None,

@@ -46,6 +46,6 @@ FORM = ViewForm(
     " more; with `--layers depth_z` float32 metres in `.npy`), `data.yaml` as `yolo`'s, for"
     " `yolo depth train data=data.yaml`",
     finish=write_depth_yaml,
-    lenses=("pinhole", "radtan"),
+    lenses=("pinhole", "radtan", "opencv"),
     convention=Convention(None, axes="", depth="mm (`depth_scale: 1000`), along the axis"),
 )

@@ -7,16 +7,43 @@ import math
 import numpy as np
 import pytest
 
-from pbrs_farm.core.camera import Camera, Intrinsics, pinholes_of
+from pbrs_farm.check.lens_rays import StoredLens
+from pbrs_farm.core.camera import Camera, Intrinsics, fold_of, pinholes_of
+from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.frames import rotation_y
-from pbrs_farm.core.lenses import Lens, lens_from_table
-from pbrs_farm.core.optics_fields import LENS_PRESETS, LensFields, fold_of
+from pbrs_farm.core.lenses import COEFFICIENTS, Lens, lens_from_table, lens_of_opencv
+from pbrs_farm.core.optics_fields import LENS_PRESETS, LensFields
+from tests.core.lenses.opencv_points import error_px
 
 PINHOLE = Intrinsics.from_hfov(640, 480)
 MODELS = {
     "pinhole": LensFields(fx=500, fy=510, cx=300, cy=260),
     "kinect": LensFields(preset="kinect"),
     "barrel": LensFields(model="radtan", k1=-0.2, k2=0.03, p1=1e-3, p2=-2e-3),
+    "eight": LensFields(
+        model="opencv",
+        fx=606,
+        k1=0.5285,
+        k2=-2.7126,
+        p1=6e-4,
+        p2=-3e-4,
+        k3=1.5561,
+        k4=0.4056,
+        k5=-2.533,
+        k6=1.4813,
+    ),
+    "fourteen": LensFields(
+        model="opencv",
+        fx=500,
+        k1=-0.28,
+        k2=0.07,
+        p1=1e-3,
+        k4=0.02,
+        s1=4e-3,
+        s4=1e-3,
+        tau_x=0.03,
+        tau_y=-0.05,
+    ),
     "tum_vi": LensFields(preset="tum_vi"),
     "fisheye180": LensFields(preset="fisheye180"),
     "equirect": LensFields(model="equirect"),
@@ -57,6 +84,44 @@ def test_only_a_fisheye_has_pixels_without_a_ray(name: str) -> None:
     assert blind[0, 0]
     assert not blind[256, 256]
     assert not camera.rays()[1][blind].any()
+
+
+def test_points_of_opencv_are_met_and_found_again_within_a_millionth_of_a_pixel() -> None:
+    assert max(error_px()) < 1e-6
+
+
+@pytest.mark.parametrize("name", ["barrel", "eight", "fourteen"])
+def test_verify_has_the_same_lens_by_its_own_code(name: str) -> None:
+    i = MODELS[name].intrinsics(PINHOLE)
+    pixels = np.random.default_rng(0).uniform(0, 1, (200, 2)) * [i.width_px, i.height_px]
+    own, directions = StoredLens.of(i.lens.table()), i.directions(pixels)
+    plane = (pixels - [i.cx, i.cy]) / [i.fx, i.fy]
+    np.testing.assert_allclose(own.rays(plane), directions, atol=1e-9)
+    np.testing.assert_allclose(own.plane_and_depth(directions)[0], plane, atol=1e-9)
+
+
+def test_a_camera_takes_opencvs_numbers_or_says_why_not() -> None:
+    k = [[500, 0, 320], [0, 500, 240], [0, 0, 1]]
+    look = {"eye": (0, 0, 0), "target": (0, 0, -1), "size": (640, 480), "K": k}
+    models = {
+        n: Camera.look_at(**look, distortion=[0.1] * 2 + [0] * (n - 3) + [0.01]).intrinsics.lens
+        for n in (4, 5, 8, 12, 14)
+    }
+    assert [lens.model for lens in models.values()] == ["radtan"] * 2 + ["opencv"] * 3
+    assert models[14].coefficients[-1] == models[12].coefficients[11] == 0.01
+    assert lens_of_opencv([0.0] * 14).is_pinhole
+    assert len(COEFFICIENTS["opencv"]) == 14
+    with pytest.raises(BadInput, match=r"4, 5, 8, 12 or 14 finite numbers"):
+        Camera.look_at(**look, distortion=[0.1] * 6)
+    with pytest.raises(BadInput, match=r"folds the picture at .* degrees: no ray falls on"):
+        Camera.from_opencv(
+            np.diag([1, -1, -1, 1]), k, size=(640, 480), distortion=[0, 0, 0, 0, 0, 3, 0, 0]
+        )
+
+
+def test_other_recipes_keep_their_digest() -> None:
+    assert "tau_x" not in LensFields(preset="kinect").model_dump()
+    assert MODELS["fourteen"].model_dump()["tau_y"] == -0.05
 
 
 def test_a_circle_of_180_degrees_covers_a_hemisphere() -> None:
@@ -106,6 +171,7 @@ def test_a_barrel_bends_lines_outwards_in_the_middle_and_a_pin_hole_does_not() -
         ({"model": "radtan", "k1": -1.5}, "folds the picture at"),
         ({"model": "radtan", "k1": -0.4, "k2": -2.0}, "folds the picture at"),
         ({"model": "fisheye", "fx": 100, "k1": -0.3}, "folds the picture at"),
+        ({"model": "opencv", "k4": 4.0}, "folds the picture at"),
         ({"model": "fisheye"}, "needs lens.fx"),
     ],
 )
