@@ -164,11 +164,16 @@ class _MirroredPath:
         self.waits, self.met = self.waits | (first & ray.is_followed), self.met | first
 
     def path(self, behind: PathState) -> PathState:
-        """The path of the stored ray; behind: the ended one."""
+        """The path of the stored ray; behind: the ended one.
+
+        Roulette compares its light with that of the pixel. A tenth of a room is all that a dark window
+        shows: thinned out as a faint part of a bright pixel it had twice a mirror's noise.
+        """
         return PathState(
             o=self.o,
             d=self.d,
             beta=self.beta,
+            faintness=dr.select(self.rest > 0, dr.max(self.beta) / self.rest, 1),
             depth=self.depth,
             n_nulls=self.n_nulls,
             met_glass=mi.Bool(True),

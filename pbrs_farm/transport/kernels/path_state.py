@@ -71,6 +71,7 @@ class PathState:
     o: mi.Point3f
     d: mi.Vector3f
     beta: mi.Color3f  # throughput
+    faintness: mi.Float  # factor of it that roulette ignores, of reflections in dark panes
     depth: mi.UInt32  # vertices so far, glass passed and cut-outs not counted
     n_nulls: mi.UInt32  # glass and cut-outs so far
     met_glass: mi.Bool  # glass so far
@@ -214,9 +215,9 @@ def surface_path(vertex: Vertex, d: Any, pdf: Any) -> PathState:
 
 
 def _first_ray(o: Any, d: Any, depth: Any, reference: ReferencePoint, pdf: Any) -> PathState:
-    white, none, unguided = mi.Color3f(1), mi.UInt32(0), mi.UInt32(NO_FACE)
-    has_met = mi.Bool(False)
-    return PathState(o, d, white, depth, none, has_met, reference, pdf, mi.Float(0), unguided)
+    white, one, none = mi.Color3f(1), mi.Float(1), mi.UInt32(0)
+    has_met, unguided = mi.Bool(False), mi.UInt32(NO_FACE)
+    return PathState(o, d, white, one, depth, none, has_met, reference, pdf, mi.Float(0), unguided)
 
 
 def white_vertex(p: Any, n: Any, near: NearbyLamps) -> Vertex:

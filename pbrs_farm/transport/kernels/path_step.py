@@ -264,7 +264,7 @@ def _strategy(
         return Strategy(is_view_independent=is_independent)
     may_aim = goes_on & (vertex.depth + 1 < context.fields.max_depth)
     guiding = guiding_at(vertex.near, vertex.si.bsdf, beta, may_aim)
-    throughput = path.beta if may_reconnect is False else None
+    throughput = path.beta / path.faintness if may_reconnect is False else None
     return Strategy(vertex.near, guiding, 1 - guiding.share, is_independent, beta=throughput)
 
 
@@ -377,6 +377,7 @@ def _follow(step: _Step, scattered: ScatteredRay) -> tuple[PathState, DirectionP
             o=offset_ray_origin(si.p, outward),
             d=d,
             beta=beta,
+            faintness=path.faintness,
             depth=vertex.depth,
             n_nulls=path.n_nulls + dr.select(is_null, mi.UInt32(1), 0),
             met_glass=path.met_glass | (vertex.is_glass & is_null),
@@ -392,7 +393,7 @@ def _follow(step: _Step, scattered: ScatteredRay) -> tuple[PathState, DirectionP
 
 def _roulette(step: _Step, scattered: ScatteredRay, beta: Any) -> tuple[Any, Any]:
     """(probability to survive, Bool: survives) of Russian roulette, of what the surface draws."""
-    q = dr.max(beta) / step.strategy.bsdf_share
+    q = dr.max(beta) / (step.strategy.bsdf_share * step.path.faintness)
     if step.strategy.near is not None:
         q *= survival_boost(step.strategy.near)
     q = dr.minimum(q, _MAX_SURVIVAL)
