@@ -28,6 +28,7 @@ INTEGRATORS: Mapping[str, tuple[str, ...]] = {
     "path": ("path", "mitsuba path"),
     "metropolis": ("pssmlt-camera",),
 }
+_PIECE_TAG = "dressed:"  # tag of an item with the id of its piece in dress.json
 _STEPS = ("light", "develop", "opengl_dl", "opengl_il")
 
 
@@ -47,6 +48,7 @@ def check_facts(case: ViewCase) -> None:
         elif house.items.get(int(row["id"]), {}).get("pose"):
             tally.expect("model poses", f"{place} instance {row['id']}", False, "lacks its pose")
     _check_tables(case)
+    _check_licences(case)
     if "layout" in table:
         _check_layout(case)
     _check_markers(case)
@@ -95,6 +97,27 @@ def _check_names(case: ViewCase, row: dict[str, Any]) -> None:
         row = {"floating": False, **row}
         floats = FLOATING in item["tags"]
         judge("instance", place, case.tally, row=row, item=item, floats=floats)
+
+
+def _check_licences(case: ViewCase) -> None:
+    """Licences are those of dress.json for the visible items' pieces and pictures, and that of the home."""
+    house, table = case.house, case.view.table
+    if "licences" not in table or not house.items:
+        return
+    items = [house.items.get(int(row["id"]), {}) for row in table["instances"]]
+    tags = [[t for t in item.get("tags", ()) if t.startswith(_PIECE_TAG)] for item in items]
+    shown = {tag.removeprefix(_PIECE_TAG) for of_item in tags for tag in of_item}
+    materials = {s["material"] for item in items for s in item.get("surfaces", ())}
+    shown |= {house.house["materials"][m]["texture_id"] for m in materials}
+    rows = [(c["licence"], c["id"]) for c in house.dress.get("credits", ()) if c["id"] in shown]
+    source = house.house["source"]
+    rows += [(source["licence"], source["file"])] if not all(tags) else []
+    expected: dict[str, list[str]] = {}
+    for licence, of in sorted(set(rows)):
+        expected.setdefault(licence, []).append(of)
+    expected.pop("", None)
+    fits = table["licences"] == expected
+    case.expect("licences")(fits, f"are {sorted(table['licences'])}, not {sorted(expected)}")
 
 
 def _check_model_pose(case: ViewCase, row: dict[str, Any]) -> None:

@@ -16,16 +16,16 @@ from pbrs_farm.check.checks import Check
 from pbrs_farm.check.form_truth import FormTruth, mask_from_runs
 from pbrs_farm.check.rules import judge
 from pbrs_farm.check.stored_files import stored_bytes, stored_object
-from pbrs_farm.check.stored_set import MODES
+from pbrs_farm.check.stored_set import MODES, PACKED
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.images import array_from_png, layers_from_exr
 
 _FAR = 65535  # mm, and more
-_FAR_IS_NOTHING = ("yolo-depth", "marigold", "openspatial")
+_FAR_IS_NOTHING = ("yolo-depth", "marigold", "openspatial", "lingbot")
 _STRUCTURE = ("wall", "floor", "ceiling", "door", "window", "otherstructure")
 _BESIDE = {
     "coco": ("form masks",), "yolo": ("form boxes",), "yolo-seg": ("form boxes",), "yolo-semantic": ("form masks",),
-    "yolo-depth": ("form depth",), "marigold": ("form depth", "form normals"), "wai": ("form depth",), "openspatial": ("form depth",),
+    "yolo-depth": ("form depth",), "marigold": ("form depth", "form normals"), "wai": ("form depth",), "openspatial": ("form depth",), "lingbot": ("form depth",),
     "nerfstudio": ("form depth", "form normals"),
 }  # fmt: skip
 """Form -> checks of the files that every picture has beside it."""
@@ -291,6 +291,20 @@ def check_class_names(case: FormCase) -> None:
     expect(named in lines, f"lacks {named}")
 
 
+def check_licences(case: FormCase) -> None:
+    """licences.txt has the licences of every kept view, and no others than those of the part."""
+    if case.form.to in PACKED:
+        return
+    file = case.form.folder / "licences.txt"
+    stored = stored_bytes(file).decode("utf-8", "replace").splitlines() if file.is_file() else []
+    expect = case.tally.at("form licences", f"forms/{case.form.name}/{case.form.part}/licences.txt")
+    views = [view.table.get("licences", ()) for view in filter(None, map(case.view, case.keys))]
+    wanted = {name for licences in views for name in licences}
+    expect(wanted <= set(stored), f"lacks {', '.join(sorted(wanted - set(stored)))}")
+    if not case.split:
+        expect(stored == sorted(wanted), f"are {stored}, not {sorted(wanted)}")
+
+
 def check_lists(case: FormCase) -> None:
     """Each line of Marigold's lists names files of one view, and every view is in the list of depth."""
     for file in case.files:
@@ -345,4 +359,5 @@ CHECKS = (
     Check("form classes", "form", check_class_names, 7, ("NYU40",)),
     Check("form lists", "form", check_lists, 8),
     Check("form frames", "form", check_frames, 9),
+    Check("form licences", "form", check_licences, 30),
 )

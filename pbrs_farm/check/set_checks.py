@@ -148,7 +148,8 @@ def _counted(stored: StoredSet, line: str) -> str:
 def _is_of_absent(case: SetCase, line: str) -> bool:
     """True for a line about the recipe of a part, where one is not at hand."""
     is_whole = len(case.stored.roots) == len(case.stored.tables["part"])
-    return not is_whole and line.startswith(("- Pictures:", "- Cameras:", "- Light:", "- Recipe:"))
+    of_roots = "- Pictures:", "- Cameras:", "- Light:", "- Recipe:", "The views show homes"
+    return not is_whole and line.startswith(of_roots)
 
 
 def _card_lines(stored: StoredSet) -> Iterator[str]:
@@ -174,6 +175,9 @@ def _card_lines(stored: StoredSet) -> Iterator[str]:
         yield f"- `forms/{name}/<part>`: {table.get('to') or name}, of {parts}"
     yield "- `index.csv`: each view, its split, and why it is left out"
     yield "## Reproduce and check"
+    licences = {name for row in kept for name in stored.licences_of(row)}
+    if licences:
+        yield f"The views show homes, models and pictures of: {', '.join(sorted(licences))}."
     credits = [f"parts/{part}/{keys.ATTRIBUTION}" for part in stored.tables["part"]]
     credits = [f"`{file}`" for file in credits if file in stored.sums]
     if credits:

@@ -17,7 +17,7 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple
 
-from pbrs_farm.check.stored_files import BadFile, stored_bytes
+from pbrs_farm.check.stored_files import BadFile, stored_bytes, stored_object
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 
@@ -113,6 +113,12 @@ class StoredSet:
             return self.index
         except BadFile:
             return []
+
+    def licences_of(self, row: IndexRow) -> tuple[str, ...]:
+        """The licences in the view.json of a row; () if the part is not at hand."""
+        root = self.roots.get(row.part, self.folder)
+        files = root.glob(f"*/{row.house}/views/{row.view}/view.json")
+        return tuple(name for file in files for name in stored_object(file).get("licences", ()))
 
     def kept(self, part: str) -> set[tuple[str, str]]:
         """(House, view) of a part's views that its forms have."""

@@ -6,14 +6,15 @@ The frame of a shape: metres, origin at the middle of its base, x to its right, 
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, field, replace
 from enum import StrEnum
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
+from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import ItemKind, LightPart, Material, Note, Surface, Texture
 from pbrs_farm.core.joints import Joint
@@ -104,6 +105,25 @@ class Catalogue:
     own: frozenset[str] = frozenset()  # ids of the pieces of the user's own libraries
     painted_folder: Path | None = None  # where painted materials are kept for other homes
     _shapes: dict[str, Shape | None] = field(default_factory=dict, init=False, repr=False)
+
+    def with_licences(self, licences: Sequence[str]) -> Catalogue:
+        """Only what is generated, and library pieces and pictures of these licences; () for all.
+
+        "CC-BY" means each version of it, but not CC-BY-SA; a piece without a named licence has none.
+        """
+        if not licences:
+            return self
+
+        def is_allowed(entry: Piece | Picture) -> bool:
+            first_word = entry.licence.partition(" ")[0]
+            return entry.licence in licences or first_word in licences
+
+        return replace(
+            self,
+            pieces=tuple(p for p in self.pieces if not p.library or is_allowed(p)),
+            pictures=tuple(filter(is_allowed, self.pictures)),
+            digest=keys.digest({"catalogue": self.digest, "licences": sorted(licences)}),
+        )
 
     def of(self, *groups: str) -> tuple[Piece, ...]:
         """The pieces of these groups, in the catalogue's order."""

@@ -5,7 +5,16 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Annotated, Any, ClassVar, Final, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, field_validator, model_validator
+from pydantic import (
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    SerializerFunctionWrapHandler,
+    field_validator,
+    model_serializer,
+    model_validator,
+)
 
 from pbrs_farm.core.camera import DEFAULT_SIZE
 from pbrs_farm.core.checked_calls import MAX_EDGE_PX, MAX_VIEW_PIXELS
@@ -38,6 +47,11 @@ def field(
 ) -> Any:
     """A field with its description and limits: low <= value <= high, above < value < below."""
     return Field(default, description=text, ge=low, le=high, gt=above, lt=below)
+
+
+def _words_of_text(value: Any) -> Any:
+    """The words of "CC0:CC-BY", as a command line has them; other values as they are."""
+    return tuple(filter(None, value.split(":"))) if isinstance(value, str) else value
 
 
 class FieldGroup(BaseModel):
@@ -120,6 +134,17 @@ class DressFields(FieldGroup):
         max_length=4096,
         description="furniture libraries, separated by ':'; `generated` = without the package",
     )
+    licences: Annotated[tuple[str, ...], BeforeValidator(_words_of_text)] = Field(
+        (),
+        description="licences of models and pictures from libraries, such as `CC0` and `CC-BY`;"
+        " empty = any",
+    )
+
+    @model_serializer(mode="wrap")
+    def _without_empty(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """The fields; no empty licences, so that digests and seeds of other recipes stay."""
+        fields: dict[str, Any] = handler(self)
+        return {name: value for name, value in fields.items() if name != "licences" or value}
 
 
 class RepairFields(FieldGroup):

@@ -19,7 +19,15 @@ from pbrs_farm.core.checked_calls import as_words, checked_call
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SPLITS, SplitShares, empty_splits, split_of_house
 from pbrs_farm.export.chosen_view import Choice, ChosenView
-from pbrs_farm.export.form import LEFT_OUT, REMARKS, ViewForm, all_forms, form_of, options_from
+from pbrs_farm.export.form import (
+    LEFT_OUT,
+    LICENCES,
+    REMARKS,
+    ViewForm,
+    all_forms,
+    form_of,
+    options_from,
+)
 from pbrs_farm.formats.class_map import class_map
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
 from pbrs_farm.regular_files import fault_of, files_below, new_folder, read_regular
@@ -45,7 +53,8 @@ def export(
     out must not exist, or be empty. selection: only the views that selection/<selection>.jsonl keeps;
     views: only these (house, view). choice: layers, modes, size and classes. shares: a folder for each
     split that has views (train, val, test, by home), each whole in itself. options: of the form, as
-    `scanner="vlp16"` of lidar. Views without labels are left out. Raises BadInput for an unknown form
+    `scanner="vlp16"` of lidar. Views without labels are left out. licences.txt lists the licences of all that
+    the views show. Raises BadInput for an unknown form
     or one of homes, an option that the form does not have, classes of the user's for a form without
     classes, a folder without finished views, a missing selection, or an out that is not empty.
 
@@ -78,6 +87,9 @@ def export(
             form.write([ChosenView(v, choice) for v in split_entries], part, choice)
         if form.finish is not None:
             form.finish(scratch, tuple(filter(None, by_split)), choice)
+        licences = sorted({name for v in entries for name in v.facts.get("licences", ())})
+        if licences:
+            (scratch / LICENCES).write_text("".join(f"{name}\n" for name in licences), "utf-8")
         if shares is not None and (empty := empty_splits((v.house.id for v in entries), shares)):
             with (scratch / REMARKS).open("a", encoding="utf-8") as remarks:
                 remarks.write(f"no home falls into {' and '.join(empty)}: export more homes\n")

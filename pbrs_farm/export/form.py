@@ -23,6 +23,8 @@ if TYPE_CHECKING:
     from pbrs_farm.export.home_pieces import ExportedHome
 
 LEFT_OUT: Final = "left_out.txt"
+LICENCES: Final = "licences.txt"
+"""A file of an export: the licences of all that its views show, a line each."""
 REMARKS: Final = "remarks.txt"
 """A file of an export whose lines are shown to its user."""
 FORMS: Final = EntryTable("pbrs_farm.export.forms", "FORM", "exports", ("ViewForm", "HomeForm"))

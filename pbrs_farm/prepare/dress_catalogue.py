@@ -31,13 +31,16 @@ def fetch_packages(words: str) -> None:
         catalogue_of_words(words)
 
 
-def catalogue_of_words(words: str) -> Catalogue:
-    """The packages (a missing one is a note), then paths separated by ":"; BadInput for a bad path."""
+def catalogue_of_words(words: str, licences: tuple[str, ...] = ()) -> Catalogue:
+    """The packages (a missing one is a note), then paths separated by ":"; BadInput for a bad path.
+
+    licences: of the pieces and pictures of libraries; () for any.
+    """
     paths = [word for word in words.split(":") if word]
     stamps = tuple((Path(word), _stamp(Path(word))) for word in paths if word != GENERATED)
     if GENERATED in paths:
-        return _catalogue(stamps, None)
-    return _catalogue(stamps, has_furniture())
+        return _catalogue(stamps, None, licences)
+    return _catalogue(stamps, has_furniture(), licences)
 
 
 def own_catalogue(paths: Sequence[Path]) -> Catalogue:
@@ -63,10 +66,13 @@ def _stamp(path: Path) -> int:
 
 
 @lru_cache(maxsize=4)
-def _catalogue(libraries: tuple[tuple[Path, int], ...], has_package: bool | None) -> Catalogue:
+def _catalogue(
+    libraries: tuple[tuple[Path, int], ...], has_package: bool | None, licences: tuple[str, ...]
+) -> Catalogue:
     from pbrs_farm.dress.content import content
 
-    catalogue = content().with_families(_of_libraries(libraries, has_package))
+    of_libraries = _of_libraries(libraries, has_package).with_licences(licences)
+    catalogue = content().with_families(of_libraries)
     return replace(catalogue, painted_folder=cache_folder() / "painted")
 
 
@@ -94,7 +100,7 @@ def _of_libraries(libraries: tuple[tuple[Path, int], ...], has_package: bool | N
 
 def catalogue_of(fields: DressFields) -> Catalogue:
     """The catalogue of a recipe, read once a process."""
-    return catalogue_of_words(fields.catalogue)
+    return catalogue_of_words(fields.catalogue, fields.licences)
 
 
 def fetch_catalogue(fields: DressFields) -> None:

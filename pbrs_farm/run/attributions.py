@@ -8,11 +8,14 @@ from __future__ import annotations
 
 import json
 import re
-from collections.abc import Iterable, Sequence
+from collections.abc import Iterable, Mapping, Sequence
+from typing import Any
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import ObjectMissing
+from pbrs_farm.core.house import House
 from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
+from pbrs_farm.dress.gates.bodies import piece_id
 from pbrs_farm.dress.report import Credit, DressReport, is_owed
 from pbrs_farm.store.object_store import Store, get_or_none
 
@@ -59,6 +62,28 @@ def attribution_text(homes: Iterable[str], credits: Iterable[Credit]) -> str:
         *_paragraph("Models and surface pictures free of conditions:", lines[False]),
     ]
     return "\n".join(parts) + "\n"
+
+
+def licences_of_view(
+    store: Store, house: House, instances: Iterable[Mapping[str, Any]]
+) -> dict[str, list[str]]:
+    """Licence -> ids of the library's models and pictures on the items of these rows of view.json, and of the home.
+
+    All pictures of an item count, on its hidden sides too. The home counts, by its file, if an item of its own is
+    visible. Generated items, and homes and models without a named licence, are not listed.
+    """
+    items = [house.items[int(row["id"]) - 1] for row in instances]
+    shown = {piece_id(item) for item in items}
+    materials = {s.material for item in items for s in item.surfaces}
+    shown |= {house.materials[m].texture_id or "" for m in materials}
+    licences: dict[str, set[str]] = {}
+    for credit in _credits(store, [keys.house_key(house.id, keys.DRESS)]):
+        if credit.id in shown:
+            licences.setdefault(credit.licence, set()).add(credit.id)
+    if any(not piece_id(item) for item in items):
+        licences.setdefault(house.source.licence, set()).add(house.source.file)
+    licences.pop("", None)
+    return {licence: sorted(ids) for licence, ids in sorted(licences.items())}
 
 
 def _paragraph(title: str, lines: set[str]) -> list[str]:

@@ -54,7 +54,7 @@ STEPS: Final = {
         # Every change of illuminance also changes light's digest, so it is not listed in `after`.
         Step("light", 30, ("house", "cameras"), needs=("illuminance",)),
         Step("develop", 8, ("light",), needs=("light",)),
-        Step("view", 3, _VIEW_READS, needs=("truth",)),
+        Step("view", 4, _VIEW_READS, needs=("truth",)),
     )
 }
 

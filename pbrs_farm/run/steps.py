@@ -34,6 +34,7 @@ from pbrs_farm.formats.view_json import view_description, view_json
 from pbrs_farm.prepare.finished_house import finished_house
 from pbrs_farm.raycast.variant import llvm_of_variant
 from pbrs_farm.run import plan
+from pbrs_farm.run.attributions import licences_of_view
 from pbrs_farm.run.develop_step import view_histogram
 from pbrs_farm.run.light_checkpoint import LightCheckpoint
 from pbrs_farm.run.step_cache import (
@@ -354,6 +355,8 @@ def _view(work: Work) -> StepOutput:
     description = view_description(
         view, work.house_id, facts, recipe_digest=digest, versions=versions()
     )
+    rows = description.get("instances", ())
+    description |= {"licences": licences_of_view(work.store, setup.house.house, rows)}
     files = {"view.json": view_json(description)}
     # Without any picture there is nothing to select by.
     rendered = [m for m in ALL_MODES if m.value in facts or (m.groups and "develop" in facts)]

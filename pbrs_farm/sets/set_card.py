@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import json
 from collections import Counter
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
@@ -10,6 +11,7 @@ import pbrs_farm
 from pbrs_farm.core import keys
 from pbrs_farm.core.house_split import SPLITS, empty_splits, home_of, split_of_house
 from pbrs_farm.curate.teaching_rules import RuleVerdict
+from pbrs_farm.regular_files import read_regular
 from pbrs_farm.sets.data_set import DataSet, SetPart
 
 MadeViews = tuple[SetPart, Path, Sequence[RuleVerdict], Mapping[str, int]]
@@ -40,6 +42,7 @@ def card_text(data_set: DataSet, made_views: Sequence[MadeViews]) -> str:
         _COMMAND.format(file=data_set.file, name=data_set.name),
         f"The file has the digest `{keys.sha256(data_set.data)}` (SHA-256). Files are equal to the last bit by one version of "
         f"pbrs_farm (here {pbrs_farm.__version__}) on processors of one kind; another kind may round a last digit otherwise.",
+        _licences(made_views),
         _credits(made_views),
     ]
     return "\n\n".join(block for block in blocks if block) + "\n"
@@ -110,6 +113,22 @@ def _forms_text(data_set: DataSet) -> str:
     rows = ["- `parts/<part>`: all rendered files (docs/formats.md of pbrs_farm)"]
     rows += [f"- `forms/{f.name}/<part>`: {f.to}, of {', '.join(f.parts)}" for f in data_set.forms]
     return "\n".join([*rows, "- `index.csv`: each view, its split, and why it is left out"])
+
+
+def _licences(made_views: Sequence[MadeViews]) -> str:
+    """The licences of all that the views of the forms show."""
+    names = {
+        name
+        for _part, root, chosen, _reasons in made_views
+        for v in chosen
+        for file in root.glob(f"*/{v.house}/views/{v.view}/view.json")
+        for name in json.loads(read_regular(file)).get("licences", ())
+    }
+    return (
+        f"The views show homes, models and pictures of: {', '.join(sorted(names))}."
+        if names
+        else ""
+    )
 
 
 def _credits(made_views: Sequence[MadeViews]) -> str:

@@ -49,7 +49,7 @@ def only(folder: Path) -> Path:
 def test_nerfstudios_poses_turn_the_home_to_z_up(root: Path, tmp_path: Path) -> None:
     n_views, n_files = export(root, tmp_path / "x", "nerfstudio")
     house = only(tmp_path / "x")
-    assert (n_views, n_files) == (6, 19)
+    assert (n_views, n_files) == (6, 20)
     transforms = json.loads((house / "transforms.json").read_text())
     turn = np.array([*transforms["applied_transform"], [0, 0, 0, 1]])
     assert len(transforms["frames"]) == 6

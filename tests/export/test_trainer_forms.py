@@ -554,3 +554,74 @@ def test_lerobots_table_library_opens_the_episodes(root: Path, tmp_path: Path) -
     np.testing.assert_array_equal(rows[1]["observation.images.first"], stored(view, "opengl_dl"))
     np.testing.assert_array_equal(rows[1]["observation.images.first_depth"], stored(view, "depth"))
     assert len(rows[1]["observation.first.K"]) == 9
+
+
+def test_layered_depth_counts_fronts_behind_clear_surfaces(stills: Path, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(stills, tmp_path / "glass"))
+    first, second = views_of(folder)
+    shape = stored(first, "depth").shape
+    # A pane, a glass block (front, back), a hollow glass (four surfaces), a wall, and what is behind it.
+    ray = [(1000, 5, 1), (1500, 6, 1), (1600, 6, 1), (2000, 7, 1), (2010, 7, 1), (2090, 7, 1), (2100, 7, 1), (3000, 8, 0)]  # fmt: skip
+    # A wall at once; a block at the wall; a pane before the open sky; nothing.
+    others = [
+        [(900, 8, 0), (950, 8, 0)],
+        [(700, 6, 1), (800, 6, 1), (801, 8, 0)],
+        [(600, 5, 1)],
+        [],
+    ]
+    planes = [np.zeros((8, *shape), np.uint16) for _ in range(3)]
+    for column, surfaces in enumerate([ray, *others]):
+        for k, values in enumerate(surfaces):
+            for plane, value in zip(planes, values, strict=True):
+                plane[k, :, column] = value
+    (first.folder / "depth_layers").mkdir()
+    names = ("depth", "instance", "clear")
+    for name, plane in zip(names, planes, strict=True):
+        stacked = np.concatenate(plane)
+        stacked = (stacked * 255).astype(np.uint8) if name == "clear" else stacked
+        (first.folder / f"depth_layers/{name}.png").write_bytes(png_from_array(stacked))
+    export(folder, tmp_path / "set", "layered-depth")
+    # `<i>_<j>.png` of the picture `<i>.png`, in millimetres.
+    layers = [np.asarray(Image.open(tmp_path / f"set/0_{j}.png")) for j in (1, 3, 5, 7)]
+    assert layers[0].dtype == np.uint16
+    columns = np.stack(layers)[:, 10, :5].T.tolist()
+    assert columns == [
+        [1000, 1500, 2000, 2090], [900, 0, 0, 0], [700, 801, 0, 0], [600, 0, 0, 0], [0, 0, 0, 0],
+    ]  # fmt: skip
+    np.testing.assert_array_equal(Image.open(tmp_path / "set/0.png"), stored(first, "opengl_dl"))
+    index = (tmp_path / "set/index.csv").read_text()
+    assert index == f"number,house,view\n0,{first.house.id},{first.id}\n"
+    assert (
+        f"{second.id}: has no picture or no layers" in (tmp_path / "set/left_out.txt").read_text()
+    )
+    with pytest.raises(BadInput, match="no view has a picture and layers"):
+        export(stills, tmp_path / "x", "layered-depth")
+
+
+def test_lingbot_reads_a_sensors_depth_with_holes(stills: Path, tmp_path: Path) -> None:
+    folder = Path(shutil.copytree(stills, tmp_path / "sensor"))
+    rng = np.random.default_rng(7)
+    for view in views_of(folder):
+        shape = stored(view, "depth").shape
+        for name in ("depth_sensor", "depth_sensor_d455"):
+            sensed = rng.integers(0, 9000, shape).astype(np.uint16)
+            (view.folder / f"{name}.png").write_bytes(png_from_array(sensed))
+        holes = rng.integers(0, 3, shape).astype(np.uint8)
+        (view.folder / "depth_hole_d455.png").write_bytes(png_from_array(holes))
+    for sensor, end in (("", ""), ("depth_sensor_d455", "_d455")):
+        out = tmp_path / f"set{end}"
+        export(folder, out, "lingbot", sensor=sensor)
+        for view in views_of(folder):
+            sample = out / view.house.id / view.id
+            # As its example: millimetres over 1000, K over the picture's size.
+            raw = np.asarray(Image.open(sample / "raw_depth.png")).astype(np.float32) / 1000
+            expected = stored(view, f"depth_sensor{end}") / np.float32(1000)
+            if end:
+                expected[stored(view, "depth_hole_d455") > 0] = 0
+            np.testing.assert_allclose(raw, expected)
+            true, millimetres = np.asarray(Image.open(sample / "depth.png")), stored(view, "depth")
+            np.testing.assert_array_equal(true, np.where(millimetres < 65535, millimetres, 0))
+            np.testing.assert_array_equal(Image.open(sample / "rgb.png"), stored(view, "opengl_dl"))
+            np.testing.assert_allclose(np.loadtxt(sample / "intrinsics.txt"), view.facts["K"])
+    with pytest.raises(BadInput, match="no view has a picture and a sensor's depth"):
+        export(stills, tmp_path / "x", "lingbot")

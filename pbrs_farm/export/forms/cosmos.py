@@ -1,4 +1,4 @@
-"""Films with control films and captions, for Cosmos Transfer's post-training (its transfer_sft_dataset.py).
+"""Films with control films and captions, for Cosmos Transfer's post-training (its TransferSFTDataset).
 
     videos/<house>.mp4  depth/<house>.mp4  seg/<house>.mp4  depth.jsonl  seg.jsonl
 

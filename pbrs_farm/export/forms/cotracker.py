@@ -1,4 +1,4 @@
-"""Films with tracks in the folders of CoTracker3's Kubric data (facebookresearch/co-tracker, kubric_movif_dataset.py).
+"""Films with tracks in the folders of CoTracker3's Kubric data (facebookresearch/co-tracker: its Kubric dataset).
 
     <house>/<house>.npy  <house>/frames/<3 digits>.png  <house>/depth/<3 digits>_depth.png
 

@@ -1,4 +1,4 @@
-"""Stereo pairs with disparity, as FoundationStereo's data set (NVlabs/FoundationStereo, scripts/vis_dataset.py).
+"""Stereo pairs with disparity, as FoundationStereo's data set (NVlabs/FoundationStereo and its script that shows it).
 
     <house>/dataset/data/{left,right}/rgb/<4 digits>.jpg
     <house>/dataset/data/left/{disparity/<4 digits>.png,intrinsics/<4 digits>.txt}

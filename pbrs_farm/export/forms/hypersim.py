@@ -65,8 +65,13 @@ def write_hypersim(views: list[ChosenView], out: Path, choice: Choice) -> None:
         _write_scene(out / scene, scene_views, tables, scene)
     for name, rows in tables.items():
         _write_table(out / name, rows)
-    credits = dict.fromkeys(v.house.attribution for v in views if v.house.attribution)
-    (out / _CREDITS).write_text("".join(f"{line}\n" for line in credits), "utf-8")
+    _write_credits(out, dict.fromkeys(v.house.attribution for v in views if v.house.attribution))
+
+
+def _write_credits(out: Path, credits: Iterable[str]) -> None:
+    """Write ATTRIBUTION.txt, unless nobody must be named."""
+    if text := "".join(f"{line}\n" for line in credits):
+        (out / _CREDITS).write_text(text, "utf-8")
 
 
 def _scene_name(number: int) -> str:
@@ -287,17 +292,18 @@ def join_splits(out: Path, splits: tuple[str, ...], _choice: Choice) -> None:
                 if "split_partition_name" in row:
                     row["split_partition_name"] = split
                 tables[name].append(row)
-        credits |= dict.fromkeys((part / _CREDITS).read_text("utf-8").splitlines())
+        if (part / _CREDITS).is_file():
+            credits |= dict.fromkeys((part / _CREDITS).read_text("utf-8").splitlines())
         for scene, name in names_of.items():
             (part / scene).rename(out / name)
         for file in (*names, _CREDITS):
-            (part / file).unlink()
+            (part / file).unlink(missing_ok=True)
         part.rmdir()
     for name, rows in tables.items():
         if rows:
             _write_table(out / name, rows)
     if splits:
-        (out / _CREDITS).write_text("".join(f"{line}\n" for line in credits), "utf-8")
+        _write_credits(out, credits)
     (out / "README.md").write_text(_card(out), "utf-8")
 
 
@@ -321,9 +327,10 @@ def _card(out: Path) -> str:
             if has_light
             else "there is no `color`: the views have no traced light"
         )
+    credits = f", `{_CREDITS}` whom to name" if (out / _CREDITS).is_file() else ""
     return f"""# Views of pbrs_farm in the layout of Hypersim
 
-Frames: {frames}. Scenes: {len(rows)}. `index.csv` says which view each is, `{_CREDITS}` whom to name.
+Frames: {frames}. Scenes: {len(rows)}. `index.csv` says which view each is{credits}.
 
 - The camera that readers assume (1024 x 768, 886.81 px) {camera}; `{hypersim.CAMERAS_CSV}` has the right one of each.
 - `depth_meters` is the distance along the ray, NaN where nothing is; `position` and normals are 0 there, `semantic`, `semantic_instance` and `render_entity_id` -1.

@@ -32,7 +32,7 @@ from pbrs_farm.images import exr_from_layers
 _COVISIBILITY: Final = "covisibility/v0"
 _LONG_SIDE: Final = 224  # of the grid of points that are looked for in other frames
 _LEAST_Z_M: Final = 0.04  # of a point in the other frame
-# A point is seen if depth differs by less than 0.1 m + 0.5 % - ln(0.5) x 0.1 m, as the repository's covisibility.py.
+# A point is seen if depth differs by less than 0.1 m + 0.5 % - ln(0.5) x 0.1 m, as in the repository.
 _WITHIN_M: Final = 0.1 - math.log(0.5) * 0.1
 _WITHIN_SHARE: Final = 0.005
 
