@@ -115,7 +115,12 @@ def test_lists_are_json_on_request(client: httpx.Client) -> None:
 
 def test_the_contents_count_views_by_class_room_objects_light_and_verdict(tmp_path: Path) -> None:
     root = write_root(tmp_path / "root", {"a-1": ("0_0_1", "0_1_0"), "b-2": ()})
-    lit = {"modes": {"light": {"floor_lux": {"outdoor": 40.0, "indoor": 60.0}}}}
+    boxes = [{"fraction": 0.5, "nyu40": k, "box3d": {"centre": [0, 0, 2 * k]}} for k in (1, 5)]
+    lit = {
+        "modes": {"light": {"floor_lux": {"outdoor": 40.0, "indoor": 60.0}}},
+        "instances": boxes,
+        "world_from_camera_opencv": np.eye(4).tolist(),
+    }
     write_view(root / "houses/b-2/views/0_0_2", **lit)
     write_view(root / "houses/b-2/views/0_0_3", instances="none", modes={"light": {"floor_lux": 3}})
     (root / "houses/b-2/views/0_0_3/depth.png").unlink()
@@ -126,6 +131,11 @@ def test_the_contents_count_views_by_class_room_objects_light_and_verdict(tmp_pa
     assert charts["Rooms"] == {"Kitchen": 3, "Bath": 1}
     assert charts["Objects in view"] == {"below 5": 4}
     assert charts["Light on the floor, lx"] == {"50 to 200": 1}
+    sizes = charts["Size (items), % of the picture"]
+    assert (sizes["5 to 20"], sizes["20 or more"]) == (0, 6)
+    assert charts["Distance (items), m"] == {
+        "below 1": 0, "1 to 2": 0, "2 to 3": 1, "3 to 5": 0, "5 or more": 1,
+    }  # fmt: skip
     assert (charts["Layers"]["depth"], charts["Layers"]["mlt_il_ol"]) == (3, 4)
     assert charts["Selection"] == {}
     assert charts["Credits (homes)"] == {"by A. Person": 2}

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import json
 import math
+from bisect import bisect_right
 from collections.abc import Mapping
 from dataclasses import dataclass
 from itertools import groupby
@@ -22,6 +23,12 @@ _BIT_OF_FILE: Final = {layer.file: 1 << k for k, layer in enumerate(LAYERS)}
 _MAX_WARNINGS: Final = 8  # maximum number per view
 
 
+SIZES: Final = (0.1, 1.0, 5.0, 20.0)
+"""Limits of bins: per cent of the picture."""
+DISTANCES: Final = (1.0, 2.0, 3.0, 5.0)
+"""Limits of bins: metres from the camera to the middle of an item."""
+
+
 @dataclass(frozen=True, slots=True)
 class ViewRow:
     """A view in the index."""
@@ -34,6 +41,7 @@ class ViewRow:
     score: float = 0.0  # of the camera's choice, larger is better
     n_objects: int = 0  # instances in view
     lux: float | None = None  # of the room's floor by all light; None if not measured
+    items: tuple[int, ...] = ()  # numbers of instances by the bins of SIZES, then of DISTANCES
 
 
 @dataclass(frozen=True, slots=True)
@@ -93,6 +101,7 @@ def _view_row(
         score=finite(facts.get("score")),
         n_objects=len(instances) if isinstance(instances := facts.get("instances"), list) else 0,
         lux=_lux(facts),
+        items=_items(facts),
     )
 
 
@@ -107,6 +116,22 @@ def _lux(facts: dict[str, Any]) -> float | None:
     light = modes.get("light") if isinstance(modes, dict) else None
     by_group = light.get("floor_lux") if isinstance(light, dict) else None
     return sum(map(finite, by_group.values())) if isinstance(by_group, dict) else None
+
+
+def _items(facts: Mapping[str, Any]) -> tuple[int, ...]:
+    rows = facts.get("instances")
+    sizes, distances = [0] * (len(SIZES) + 1), [0] * (len(DISTANCES) + 1)
+    for row in rows if isinstance(rows, list) else ():
+        if not isinstance(row, dict):
+            continue
+        sizes[bisect_right(SIZES, 100 * finite(row.get("fraction")))] += 1
+        try:
+            eye = [float(line[3]) for line in facts["world_from_camera_opencv"][:3]]
+            metres = math.dist(eye, row["box3d"]["centre"])
+        except (KeyError, IndexError, TypeError, ValueError):
+            continue
+        distances[bisect_right(DISTANCES, metres)] += 1
+    return (*sizes, *distances)
 
 
 def _class_bits(instances: Any) -> int:

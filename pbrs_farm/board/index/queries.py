@@ -3,14 +3,14 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Callable, Collection, Mapping
+from collections.abc import Callable, Collection, Mapping, Sequence
 from dataclasses import asdict, dataclass, fields, replace
 from functools import lru_cache
 from itertools import pairwise
 from typing import Any, Final, Generic, TypeVar
 from urllib.parse import urlencode
 
-from pbrs_farm.board.index.house_rows import LAYER_BIT
+from pbrs_farm.board.index.house_rows import DISTANCES, LAYER_BIT, SIZES
 from pbrs_farm.board.index.view_index import LAYERS_PER_COLUMN, ViewIndex
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.layers import LAYERS
@@ -236,6 +236,7 @@ class Queries:
             "Classes in view": _largest(classes),
             "Rooms": self._bars("SELECT room, count(*) FROM view GROUP BY 1 ORDER BY 2 DESC"),
             "Objects in view": self._bars(_in_bins("n_objects", (5, 10, 20, 40, 80))),
+            **self._items(),
             "Light on the floor, lx": self._bars(_in_bins("lux", (10, 50, 200, 1000, 5000))),
             "Layers": _largest(layers),
             "Selection": self._bars(
@@ -247,6 +248,17 @@ class Queries:
                 " GROUP BY 1 ORDER BY 2 DESC"
             ),
         }
+
+    def _items(self) -> dict[str, list[tuple[str, int]]]:
+        bins = {
+            "Size (items), % of the picture": _bins_of(SIZES),
+            "Distance (items), m": _bins_of(DISTANCES),
+        }
+        numbers = range(sum(map(len, bins.values())))
+        sums = ", ".join(f"sum(json_extract(items, '$[{k}]'))" for k in numbers)
+        counts = iter(self._index.rows(f"SELECT {sums} FROM view")[0])
+        charts = {title: [(bar, next(counts) or 0) for bar in bars] for title, bars in bins.items()}
+        return {title: bars if any(n for _bar, n in bars) else [] for title, bars in charts.items()}
 
     def _bars(self, sql: str) -> list[tuple[str, int]]:
         rows = self._index.rows(f"{sql} LIMIT {_MAX_BARS}")
@@ -299,11 +311,17 @@ def _largest(counts: Mapping[str, int]) -> list[tuple[str, int]]:
     return [bar for bar in bars[:_MAX_BARS] if bar[1]]
 
 
-def _in_bins(column: str, limits: tuple[int, ...]) -> str:
-    """SQL of the numbers of views by the bins of a column, between consecutive limits."""
-    ends = [f"WHEN {column} < {limits[0]} THEN 'below {limits[0]:,}'"]
-    ends += [f"WHEN {column} < {b} THEN '{a:,} to {b:,}'" for a, b in pairwise(limits)]
-    case = f"CASE {' '.join(ends)} ELSE '{limits[-1]:,} or more' END"
+def _bins_of(limits: Sequence[float]) -> list[str]:
+    """Names of the bins below, between and above limits."""
+    between = [f"{a:,g} to {b:,g}" for a, b in pairwise(limits)]
+    return [f"below {limits[0]:,g}", *between, f"{limits[-1]:,g} or more"]
+
+
+def _in_bins(column: str, limits: Sequence[float]) -> str:
+    """SQL of the numbers of views by the bins of a column."""
+    *names, last = _bins_of(limits)
+    ends = [f"WHEN {column} < {end} THEN '{name}'" for end, name in zip(limits, names, strict=True)]
+    case = f"CASE {' '.join(ends)} ELSE '{last}' END"
     known = f"WHERE {column} IS NOT NULL"
     return f"SELECT {case}, count(*) FROM view {known} GROUP BY 1 ORDER BY min({column})"
 

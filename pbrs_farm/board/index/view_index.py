@@ -16,7 +16,7 @@ from typing import Any, Final
 from pbrs_farm.board.index.house_rows import HouseRow
 from pbrs_farm.core.lighting import ALL_MODES
 
-_VERSION: Final = 4  # of the tables below and of covers
+_VERSION: Final = 5  # of the tables below and of covers
 LAYERS_PER_COLUMN: Final = 62  # bits: an integer of SQLite has 64
 _SCHEMA: Final = f"""
 PRAGMA journal_mode = WAL;
@@ -28,7 +28,7 @@ CREATE TABLE IF NOT EXISTS house (
 CREATE TABLE IF NOT EXISTS view (
     house TEXT NOT NULL, id TEXT NOT NULL, room TEXT NOT NULL, layers INTEGER NOT NULL,
     more_layers INTEGER NOT NULL, classes INTEGER NOT NULL, warnings TEXT NOT NULL, reason TEXT,
-    n_objects INTEGER NOT NULL, lux REAL,
+    n_objects INTEGER NOT NULL, lux REAL, items TEXT NOT NULL,
     PRIMARY KEY (house, id)
 ) WITHOUT ROWID;
 CREATE INDEX IF NOT EXISTS view_of_room ON view (room, house, id);
@@ -127,7 +127,7 @@ def _enter_house(connection: sqlite3.Connection, house: HouseRow, fingerprint: s
     )
     connection.execute("DELETE FROM view WHERE house = ?", (house.id,))
     connection.executemany(
-        "INSERT INTO view VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
+        "INSERT INTO view VALUES (?, ?, ?, ?, ?, ?, ?, ?, ?, ?, ?)",
         (
             (
                 house.id,
@@ -140,6 +140,7 @@ def _enter_house(connection: sqlite3.Connection, house: HouseRow, fingerprint: s
                 reasons.get(v.id),
                 v.n_objects,
                 v.lux,
+                json.dumps(v.items),
             )
             for v in house.views
         ),

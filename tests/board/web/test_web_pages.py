@@ -263,7 +263,9 @@ def test_a_home_called_script_is_text(tab: Any, tmp_path: Path) -> None:
         until(tab, "document.getElementById('probe').textContent.includes('<script>')")
 
 
-@pytest.mark.parametrize("path", ["/", "/views", VIEW, f"{VIEW}/relight?denoise=0", "/homes/a-1"])
+@pytest.mark.parametrize(
+    "path", ["/", "/views", VIEW, f"{VIEW}/relight?denoise=0", "/homes/a-1", "/contents"]
+)
 @pytest.mark.parametrize(("width", "scheme"), [(390, "dark"), (1600, "light")])
 def test_no_page_is_wider_than_its_screen(
     path: str, width: int, scheme: str, browser: Any, base: str
