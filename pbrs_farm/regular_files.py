@@ -143,6 +143,7 @@ def new_folder(out: Path) -> Iterator[Path]:
 
     Raises BadInput if out is not empty or cannot be written.
     """
+    out = out.absolute()
     if out.exists() and (not out.is_dir() or any(out.iterdir())):
         raise BadInput(out, "", "already exists", hint="name a new folder")
     # Write to a sibling on the same file system, then rename it.

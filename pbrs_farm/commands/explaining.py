@@ -107,6 +107,8 @@ def _dress(args: argparse.Namespace) -> int:
     from pbrs_farm.run.attributions import attribution_text
 
     at_least("--views", args.views, 0)
+    if args.out.exists() and not args.out.is_dir():
+        raise BadInput(args.out, "", "is not a folder")
     need("mitsuba", "drjit", *(["moderngl"] if args.views else []))
     seeds = dress_seeds(args.dress, "--seed")
     if len(seeds) != 1:

@@ -126,7 +126,8 @@ def _folder(path: Path) -> None:
     try:
         path.mkdir(parents=True, exist_ok=True)
     except OSError as error:
-        raise BadInput(path, "", error.strerror or "is not a folder") from None
+        text = "is not a folder" if path.exists() else error.strerror or "cannot be made"
+        raise BadInput(path, "", text) from None
 
 
 def _asked_for(args: argparse.Namespace) -> tuple[list[MadeHome], Programme | None]:

@@ -210,12 +210,10 @@ def _check_homes(words: Sequence[str], models: str) -> None:
 
 def _check_recipe(recipe: Recipe) -> None:
     """Raise the error of a style, a furniture library or a camera file that does not exist."""
-    from pbrs_farm.dress.style import STYLES
+    from pbrs_farm.dress.style import check_style
     from pbrs_farm.prepare.dress_catalogue import GENERATED
 
-    style = recipe.dress.style
-    if style and style not in STYLES:
-        raise BadInput("dress.style", style, "no such style", hint=hint_of_choice(style, STYLES))
+    check_style(recipe.dress.style)
     for path in filter(None, recipe.dress.catalogue.split(":")):
         if path != GENERATED and not Path(path).exists():
             raise BadInput("dress.catalogue", path, "no such file or folder")

@@ -163,12 +163,14 @@ def _limit(args: argparse.Namespace) -> None:
 
 
 def _gc(args: argparse.Namespace) -> None:
-    from workers.client.garbage import garbage, keep_from_text, remove
+    from workers.client.garbage import garbage, jobs_in, keep_from_text, remove
 
     farm, keep_s = farm_of(args), keep_from_text(args.keep)
-    farm.ledger.ping()
-    if args.yes:
-        farm.rights.check_admin("gc --yes")
+    # An output folder of `run` has no jobs, and needs no Redis.
+    if jobs_in(farm.store):
+        farm.ledger.ping()
+        if args.yes:
+            farm.rights.check_admin("gc --yes")
     groups = garbage(farm, keep_s, time.time())
     n = remove(farm, groups) if args.yes else 0
     rows = [{"kind": g.kind, "objects": len(g.found), "bytes": g.n_bytes} for g in groups]

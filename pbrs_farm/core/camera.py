@@ -201,6 +201,16 @@ class Camera:
     blur: CameraBlur | None = None  # of light; labels are sharp
     has_own_size: bool = True  # False: it takes the size of the recipe it is rendered with
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.intrinsics, Intrinsics):
+            text, hint = (
+                "expected Intrinsics",
+                "Camera.look_at(...) and Camera.from_opencv(...) give them",
+            )
+            raise BadInput("Camera", "intrinsics", text, hint=hint)
+        if np.shape(self.world_from_camera) != (4, 4):
+            raise BadInput("Camera", "world_from_camera", "expected a (4, 4) matrix")
+
     @staticmethod
     def look(
         intrinsics: Intrinsics,

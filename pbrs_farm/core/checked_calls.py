@@ -108,7 +108,8 @@ def checked_call(function: Callable[_P, _R]) -> Callable[_P, _R]:
             given = signature.bind(*args, **kwargs).arguments
         except TypeError as error:
             unknown = [name for name in kwargs if name not in signature.parameters]
-            near = hint_of_choice(unknown[0], list(signature.parameters)) if unknown else ""
+            names = [name for name in signature.parameters if name != "self"]
+            near = hint_of_choice(unknown[0], names) if unknown else ""
             text = f"{function.__name__}(): {error}"
             raise TypeError(f"{text}; {near}" if near else text) from None
         for name, value in given.items():

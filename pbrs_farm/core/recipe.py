@@ -153,6 +153,13 @@ class Recipe(FieldGroup):
         name = DRAWN if variant else self.tone.camera
         return picture_camera(name, self.tone, self.sensor, seed)
 
+    def __init__(self, **fields: Any) -> None:
+        try:
+            super().__init__(**fields)
+        except ValidationError as error:
+            lines = "; ".join(map(_fault, error.errors(include_url=False)))
+            raise BadRecipe(lines, hint="`pbrs-farm recipes` lists every field") from None
+
     def digest(self, *groups: str) -> str:
         """Digest of the seed and the named groups; of all fields but the name when none is named.
 
@@ -206,7 +213,7 @@ def changed_recipe(
         fields[group] = {**preset_value, **value} if join and preset_value is not None else value
     for path, text in overrides.items():
         _set(fields, path, text)
-    return _validated(fields)
+    return Recipe(**fields)
 
 
 def with_settings(recipe: Recipe, settings: Mapping[str, Any]) -> Recipe:
@@ -224,15 +231,7 @@ def with_settings(recipe: Recipe, settings: Mapping[str, Any]) -> Recipe:
             fields[group] = value
         elif isinstance(fields.setdefault(group, {}), dict):
             fields[group][field] = value
-    return _validated(fields)
-
-
-def _validated(fields: Mapping[str, Any]) -> Recipe:
-    try:
-        return Recipe.model_validate(fields)
-    except ValidationError as error:
-        lines = "; ".join(map(_fault, error.errors(include_url=False)))
-        raise BadRecipe(lines, hint="`pbrs-farm recipes` lists every field") from None
+    return Recipe(**fields)
 
 
 def _fault(fault: ErrorDetails) -> str:
@@ -289,7 +288,7 @@ def recipe_from_json(data: bytes, place: str) -> Recipe:
     """Read a stored recipe.json; BadRecipe naming its place. A person's .toml: formats.recipe_toml."""
     try:
         return Recipe.model_validate_json(data)
-    except ValidationError:
+    except (ValidationError, BadRecipe):
         raise BadRecipe(f"{place}: is not a recipe of this version") from None
 
 

@@ -16,6 +16,7 @@ from pydantic import BeforeValidator, ConfigDict, model_validator
 
 from pbrs_farm.core.errors import BadRecipe
 from pbrs_farm.core.record import Record, read_toml
+from pbrs_farm.core.shown_text import hint_of_choice
 from pbrs_farm.home.room_use import RoomKind
 
 _T = TypeVar("_T")
@@ -160,10 +161,15 @@ COLOURS: Final = read_toml(Path(__file__).with_name("colours.toml"), dict[str, C
 STYLES = tuple(taste.name for taste in _TASTES)
 
 
+def check_style(name: str) -> None:
+    """Raise BadRecipe for the name of a style that does not exist; "" is any style."""
+    if name and name not in STYLES:
+        raise BadRecipe(f"style: {name}: no such style", hint=hint_of_choice(name, STYLES))
+
+
 def style_for(rng: np.random.Generator, name: str = "") -> Style:
     """A home's style: of that name, or any; BadRecipe where there is no style of that name."""
-    if name and name not in STYLES:
-        raise BadRecipe(f"there is no style {name!r}: choose one of {', '.join(STYLES)}")
+    check_style(name)
     # Draw even where the name decides, so that the name changes nothing else.
     index = int(rng.integers(len(_TASTES)))
     taste = _TASTES[STYLES.index(name)] if name else _TASTES[index]

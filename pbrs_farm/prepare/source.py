@@ -128,6 +128,8 @@ def resolve(word: str, files: SourceFiles | None = None, *, models: str = "") ->
     """
     word, part = _parted(word)
     path = Path(word)
+    if not word:
+        raise BadHouse("home", "", "is empty", hint="a file, an example home's name, or builtin")
     if not _is_utf8(word):
         raise BadHouse(word, "", "the path is not UTF-8", hint="rename the file or its folder")
     if path.name.endswith(SAVED_SUFFIX):

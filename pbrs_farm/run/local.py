@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import os
+from pathlib import Path
 
 from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.shown_text import MAX_PLACE, shown
@@ -12,6 +13,7 @@ from pbrs_farm.prepare.passes import uses_catalogue
 from pbrs_farm.prepare.source import resolve, variants
 from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.regular_files import real_path
 from pbrs_farm.run import plan
 from pbrs_farm.run.local_run import Observer, Run, Summary
 from pbrs_farm.run.output_root import claim_root, finish_root
@@ -74,7 +76,8 @@ def _resolved(run: Run, summary: Summary) -> list[SourceRef]:
         try:
             source = resolve(word, files, models=run.models)
         except PbrsError as error:
-            summary.failures.append((shown(word, MAX_PLACE), str(error), ""))
+            text = str(error).removeprefix(f"{real_path(Path(word))}: ")
+            summary.failures.append((shown(word, MAX_PLACE), text, ""))
             continue
         for variant in variants(source, seeds):
             sources.setdefault(variant.house_id, variant)

@@ -12,6 +12,7 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, replace
 from fnmatch import fnmatchcase
 from functools import cached_property
+from numbers import Real
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any, ClassVar
 
@@ -59,6 +60,7 @@ from pbrs_farm.core.recipe import Recipe, recipe_from_name, with_settings
 from pbrs_farm.core.shown_text import did_you_mean, shown
 from pbrs_farm.core.table import Table
 from pbrs_farm.crash_notes import waiting_lines
+from pbrs_farm.dress.style import check_style
 from pbrs_farm.formats.cameras_json import views_from_json
 from pbrs_farm.prepare.source import SAVED_SUFFIX, resolve, saved_home, variants
 from pbrs_farm.prepare.source_ref import SourceRef
@@ -83,11 +85,16 @@ Keys = Annotated[
     Where("{seconds: share}, shares in 0..1", lambda at: len(at) > 0 and _are_keys(at)),
 ]
 Angle = Annotated[float, Where("an angle above 0, 180 degrees at most", lambda a: 0 < a <= 180)]
+Minutes = Annotated[float, Where("seconds above 0, 600 at most", lambda s: 0 < s <= 600)]
+CameraCount = Annotated[int, Where("a whole number in 1..10,000", lambda n: 1 <= n <= 10_000)]
 Edge = Annotated[int, Where(f"1 to {MAX_EDGE_PX} pixels", lambda px: 1 <= px <= MAX_EDGE_PX)]
 
 
 def _are_keys(at: Mapping[float, float]) -> bool:
-    return all(math.isfinite(t) and 0 <= share <= 1 for t, share in at.items())
+    pairs = [*at.items()]
+    return all(isinstance(v, Real) for pair in pairs for v in pair) and all(
+        math.isfinite(t) and 0 <= share <= 1 for t, share in pairs
+    )
 
 
 _WARM_WHITE_K = 3000.0  # colour temperature of an added bulb
@@ -289,7 +296,7 @@ class Home:
         if not fields:
             return self
         home = replace(self, settings=tuple({**dict(self.settings), **fields}.items()))
-        _ = home.recipe
+        check_style(home.recipe.dress.style)
         return home
 
     @checked_call
@@ -303,6 +310,8 @@ class Home:
         """
         fields = {"sky.sun_azimuth_deg": azimuth, "sky.sun_elevation_deg": elevation}
         changes = {name: value for name, value in fields.items() if value is not None}
+        if not changes:
+            raise BadInput("sun", "azimuth", "give this, elevation= or both")
         return self.set(**{"sky.kind": "sunsky", **changes})
 
     @checked_call
@@ -419,20 +428,25 @@ class Home:
         return self._edited(RemoveItems(items=self._ids(items)))
 
     @checked_call
-    def move(self, items: ItemLike, by: Vector = (0.0, 0.0, 0.0), turn_deg: float = 0.0) -> Home:
+    def move(
+        self, items: ItemLike, by: Vector | None = None, turn_deg: float | None = None
+    ) -> Home:
         """The home with items moved by (x, y, z) metres and turned about the vertical of their middle.
 
-        A place in no room is a warning.
+        Give one or both. A place in no room is a warning.
 
         >>> moved = home.move("sofa", by=(0.1, 0, 0))
         >>> np.round(moved.items["sofa"].bounds - home.items["sofa"].bounds, 3)[0].tolist()
         [0.1, 0.0, 0.0]
         """
+        if by is None and turn_deg is None:
+            raise BadInput("move", "by", "give this, turn_deg= or both")
         ids = self._ids(items)
         bounds = np.array([item.bounds for item in self.house.items if item.id in ids])
         middle = (np.nanmin(bounds[:, 0], 0) + np.nanmax(bounds[:, 1], 0)) / 2
-        turn = rotation_y(math.radians(turn_deg))
-        matrix = affine(turn, middle - turn @ middle + np.asarray(by, np.float64))
+        turn = rotation_y(math.radians(turn_deg or 0.0))
+        shift = np.asarray((0, 0, 0) if by is None else by)
+        matrix = affine(turn, middle - turn @ middle + shift)
         return self._edited(MoveItems(items=ids, world_from_world=rows_of_matrix(matrix)))
 
     @checked_call
@@ -506,7 +520,7 @@ class Home:
         push: Vector = (0.0, 0.0, 0.0),
         spin: Vector = (0.0, 0.0, 0.0),
         from_s: float = 0.0,
-        seconds: Positive = 5.0,
+        seconds: Minutes = 5.0,
     ) -> Home:
         """The home in which items fall from from_s on, slide and come to rest, for films.
 
@@ -588,16 +602,18 @@ class Home:
         kelvin: Kelvin | None = None,
         colour: Colour | None = None,
         towards: Vector | None = None,
-        angle_deg: Angle = 60.0,
+        angle_deg: Angle | None = None,
         name: str = "",
     ) -> Home:
-        """The home with one more bulb at (x, y, z), or with towards a spot of a full angle.
+        """The home with one more bulb at (x, y, z), or with towards a spot of a full angle, 60 degrees if not given.
 
         kelvin and colour as of light; 3000 kelvin without either. A bulb in no room is a warning.
 
             >>> len(home.add_light((2, 2.2, 2), lm=400).items) - len(home.items)
             1
         """
+        if angle_deg is not None and towards is None:
+            raise BadInput("add_light", "angle_deg", "is of a spot: give towards=, too")
         aim = None if towards is None else np.asarray(towards, np.float64) - np.asarray(at)
         if aim is not None and not np.linalg.norm(aim) > 0:
             raise BadInput("add_light", "towards", "is the position of the light")
@@ -608,7 +624,7 @@ class Home:
             lm=float(lm),
             rgb_linear=rgb,
             direction=None if aim is None else triple(aim / np.linalg.norm(aim)),
-            cutoff_rad=math.radians(angle_deg) / 2,
+            cutoff_rad=math.radians(60.0 if angle_deg is None else angle_deg) / 2,
         )
         return self._edited(edit)
 
@@ -654,6 +670,8 @@ class Home:
                 raise BadInput("items", repr(word), "expected names of items, or items")
             else:
                 ids |= dict.fromkeys(item.id for item in self.items.named(word))
+        if not ids:
+            raise BadInput(self.id, "items", "give at least one")
         return tuple(ids)
 
     def _supports_named(self, on: str | Item | Room | None) -> list[Item | Room]:
@@ -743,7 +761,7 @@ class Home:
     def cameras_around(
         self,
         items: ItemLike | None = None,
-        n: Count = 1,
+        n: CameraCount = 1,
         *,
         distance_m: Span = (0.5, 1.2),
         elevation_deg: Span = (15.0, 65.0),

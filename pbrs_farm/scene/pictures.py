@@ -20,8 +20,10 @@ from pbrs_farm.core.checked_calls import (
 )
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.lighting import ALL_MODES, Mode
+from pbrs_farm.core.options import options_of, record_of
 from pbrs_farm.core.recipe import Recipe, with_settings
 from pbrs_farm.core.shot import MOST_FRAMES
+from pbrs_farm.core.shown_text import hint_of_choice
 from pbrs_farm.formats.rig_toml import rig_from_table, rig_from_toml
 from pbrs_farm.progress import progress_reporter
 from pbrs_farm.run.local import run_local
@@ -293,11 +295,18 @@ def render_homes(
 def _wanted_of_words(
     modes: Words, layers: Words, views: int | None, options: Mapping[str, Any]
 ) -> Wanted:
-    for name in options.keys() - Wanted.model_fields.keys():
-        raise TypeError(f"render_homes() got an unexpected keyword argument {name!r}")
-    mode_names = _words(modes, "modes") or ALL_MODES
-    layer_names = _words(layers, "layers")
-    return wanted_of(Wanted(modes=mode_names, layers=layer_names, n_views=views or 0, **options))
+    names = options_of(Wanted)
+    for name in options.keys() - names.keys():
+        near = hint_of_choice(
+            name, ["homes", "out", "recipe", "jobs", "observe", "progress", *names]
+        )
+        raise TypeError(f"render_homes() got an unexpected keyword argument {name!r}; {near}")
+    update = {
+        "modes": _words(modes, "modes") or ALL_MODES,
+        "layers": _words(layers, "layers"),
+        "n_views": views or 0,
+    }
+    return wanted_of(record_of(options, Wanted).model_copy(update=update))
 
 
 def _recipe_of_home(home: Home, recipe: str | Path | Recipe | None) -> Recipe:

@@ -52,6 +52,8 @@ def store_from_url(url: str, settings: StoreSettings | None = None) -> Store:
 
 def _folder(root: Path, settings: StoreSettings) -> Store:
     """A folder store; a packed root if it is one already (e.g. a copy of a bucket) or is to become one."""
+    if root.exists() and not root.is_dir():
+        raise BadInput(root, "", "is not a folder")
     store, packs = FolderStore(root, fsync=settings.fsync), settings.layout == "packed"
     return _laid_out(store, packs) if packs or (root / LAYOUT).is_file() else store
 

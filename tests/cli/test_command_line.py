@@ -32,6 +32,55 @@ def refusal(capsys: pytest.CaptureFixture[str], *words: str, code: int) -> str:
     return error
 
 
+# A command line, its message, the exit code.
+WRONG: list[tuple[list[str], str, int]] = [
+    (words.split(), says, code)
+    for words, says, code in (
+        ("run", "no home given", 1),
+        ("run nowhere.sh3d --out o", "nowhere.sh3d: no such file", 1),
+        ("run builtin --out", "expected one argument", 2),
+        ("run builtin --out file.txt", "file.txt: is not a folder", 1),
+        ("run builtin --out s3://", "not a store", 1),
+        ("run builtin --out o --recipe file.txt", "file.txt", 1),
+        ("run builtin --out o --size 64", "--size: 64: expected a width and a height", 1),
+        ("run builtin --out o --size 999999x999999", "1 to 16384 pixels", 1),
+        ("run builtin --out o --jobs 0", "--jobs: 0: expected 1 or more", 1),
+        ("run builtin --out o --views many", "--views: invalid int value: 'many'", 2),
+        ("run builtin --out o --set light.spp", "expected group.field=value", 1),
+        ("run builtin --out o --set light.spp=abc", "light.spp: expected a whole number", 1),
+        ("run builtin --out o --fps 10", "--fps: is for walks only", 1),
+        ("run builtin --out o --trajectory nofile", "nofile: no such file", 1),
+        ("run builtin --out o --memory -1", "--memory: -1.0: expected 0 or more", 1),
+        ("run made:3..1 --out o", "runs downwards", 1),
+        ("run made:1,rooms=99 --out o", "99: is above 4", 1),
+        ("dress builtin --out file.txt", "file.txt: is not a folder", 1),
+        ("homes make 2 --out file.txt", "file.txt: is not a folder", 1),
+        ("homes make 0 --out o", "0: expected 1 home or more", 1),
+        ("export empty --to coco --out o", "it has no houses", 1),
+        ("export nowhere --to coco --out o", "nowhere: no such folder", 1),
+        ("export empty --to coco --out o --split 3/2", "--split: 3/2: expected train/val/test", 1),
+        ("pack empty --out o", "no finished view", 1),
+        ("make indoor-1k --out o --shard 5/4", "--shard: 5/4: expected K/N", 1),
+        ("make indoor-1k --out file.txt", "file.txt: is not a folder", 1),
+        ("make nope --out o", "nope: no such set", 1),
+        ("estimate indoor-1k --cloud Mars", "Mars: no prices of this cloud", 1),
+        ("verify empty", "empty: no houses here", 1),
+        ("board nowhere", "nowhere: no such folder", 1),
+        ("board empty --port 80x", "--port: invalid int value", 2),
+        ("relight empty --indoor 2", "view.json: no such file", 1),
+        ("sheet empty", "it has no houses", 1),
+        ("scatter builtin --models empty --out o --count 0", "--count: 0: expected 1 or more", 1),
+        ("scatter builtin --models nowhere --out o", "nowhere: no model found", 1),
+        ("homes nope", "invalid choice: 'nope'", 2),
+        ("help nopage", "no page has 'nopage'", 1),
+        ("cache --clear nope", "no entry 'nope'", 1),
+        ("evaluate", "give either a RUN or --task", 1),
+        ("gc --store nowhere --keep 3x", "--keep: 3x: not a time", 1),
+        ("films", "no command 'films'", 2),
+    )
+]
+
+
 @pytest.mark.parametrize(
     ("words", "says", "code"),
     [
@@ -54,11 +103,20 @@ def refusal(capsys: pytest.CaptureFixture[str], *words: str, code: int) -> str:
         (["verify", "nowhere"], "nowhere: no such folder (give the output folder of a run)", 1),
         (["relight", "nowhere"], "no such file (OUT/houses/HOUSE/views/VIEW)", 1),
         (["dress", "builtin", "--out", "x", "--seed", "red"], "--seed: red: expected", 1),
+        *WRONG,
     ],
 )
 def test_a_misspelling_is_answered_with_suggestions(
-    words: list[str], says: str, code: int, capsys: pytest.CaptureFixture[str]
+    words: list[str],
+    says: str,
+    code: int,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    capsys: pytest.CaptureFixture[str],
 ) -> None:
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "empty").mkdir()
+    (tmp_path / "file.txt").write_text("x")
     error = refusal(capsys, *words, code=code)
     assert says in error
     assert error.count("\n") == 1

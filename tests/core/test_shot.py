@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numpy as np
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -39,7 +40,7 @@ def test_without_the_names_of_its_rig_an_ending_belongs_to_the_take() -> None:
 
 
 def test_a_view_knows_its_camera_of_the_rig() -> None:
-    camera = Camera(Intrinsics.from_hfov(8, 6), None)  # type: ignore[arg-type]
+    camera = Camera(Intrinsics.from_hfov(8, 6), np.eye(4))
     place = RigPlace("rig", "right", "0_1_2", None)  # type: ignore[arg-type]
     assert View("0_1_2_right", "0_1", 2, camera, rig=place).shot == Shot("0_1_2", eye="right")
     assert View("0_1_2", "0_1", 2, camera, rig=place).shot == Shot("0_1_2")

@@ -287,6 +287,50 @@ WRONG: list[tuple[str, Call, str]] = [
     ("Views.export", lambda g: g.views.export(g.folder / "v", to="cocoa"), "^to: cocoa"),
     ("Views.export", lambda g: g.views.export(g.folder / "v", layers="dpeth"), "^layers: dpeth"),
     ("Views.export", lambda g: g.views.export(g.folder / "v", size=(0, 1)), "export: size"),
+    ("load", lambda g: pf.load(""), "home: is empty"),
+    ("load", lambda g: pf.load("http://example.org/home.glb"), "no such file"),
+    ("make", lambda g: pf.make(10**30), "is above 2147483647"),
+    ("make", lambda g: pf.make(7, rooms=1000), "1000: is above 4"),
+    ("make", lambda g: pf.make(7, area=-3), "area=-3"),
+    ("model", lambda g: pf.model(g.folder), "is not a supported mesh format"),
+    ("model", lambda g: pf.model(g.folder / "can.ply", size_m=1e9), "1e.09 m large"),
+    ("models", lambda g: pf.models([g.folder / "can.ply"]), "models: pattern"),
+    ("generate_model", lambda g: pf.generate_model("bedd"), "did you mean bed"),
+    ("generate_model", lambda g: pf.generate_model(3), "generate_model: name"),
+    ("generate_model", lambda g: pf.generate_model("bed", width_m=1000), "bed, width_m: 1000"),
+    ("generate_model", lambda g: pf.generate_model("bed", widht_m=1), "did you mean width_m"),
+    ("generate_model", lambda g: pf.generate_model("bed", style="xyz"), "style: xyz: no such"),
+    ("Recipe", lambda g: pf.Recipe(light=3), "^light: "),
+    ("Recipe", lambda g: pf.Recipe(seed="one"), "^seed: "),
+    ("Recipe", lambda g: pf.Recipe(lihgt={"spp": 3}), "lihgt.*did you mean light"),
+    ("Camera", lambda g: pf.Camera(None, None), "Camera: intrinsics: .*look_at"),
+    ("Camera", lambda g: pf.Camera(g.camera.intrinsics, "pose"), "Camera: world_from_camera"),
+    ("Packing", lambda g: pf.Packing(layers=()), "layers: give at least one"),
+    ("Packing", lambda g: pf.Packing(shares=(1, 2, 3)), "Packing: shares"),
+    ("render", lambda g: pf.render([g.home], g.camera), "render: home: expected a Home"),
+    ("render", lambda g: pf.render(g.home, {"eye": 1}), "render: cameras: expected"),
+    (
+        "render_homes",
+        lambda g: pf.render_homes(g.home, g.folder / "x", pairs=3),
+        "pairs: expected true or false|pairs: ",
+    ),
+    ("render_homes", lambda g: pf.render_homes(g.home, g.folder / "can.ply"), "is not a folder"),
+    ("render_homes", lambda g: pf.render_homes(g.home, "ftp://x/y"), "not a store"),
+    ("Home.dress", lambda g: g.home.dress(1, style="japandii"), "style: japandii: no such"),
+    ("Home.set", lambda g: g.home.set(**{"light.spp": -1}), "light.spp: expected 1 or more"),
+    ("Home.sun", lambda g: g.home.sun(), "sun: azimuth: give this, elevation"),
+    ("Home.without", lambda g: g.home.without([]), "items: give at least one"),
+    ("Home.move", lambda g: g.home.move([], by=(1, 0, 0)), "items: give at least one"),
+    ("Home.move", lambda g: g.home.move("sofa"), "move: by: give this, turn_deg"),
+    ("Home.drop", lambda g: g.home.drop([]), "items: give at least one"),
+    ("Home.drop", lambda g: g.home.drop("sofa", seconds=1e9), "drop: seconds: .*600 at most"),
+    ("Home.add_light", lambda g: g.home.add_light((1, 1, 1), 9, angle_deg=30), "give towards"),
+    ("Home.cameras_around", lambda g: g.home.cameras_around("sofa", n=10**9), "1..10,000"),
+    ("Home.open", lambda g: g.home.open("door_*", at={"a": 0}), "open: at: .*seconds"),
+    ("Home.export", lambda g: g.home.export(g.folder / "e", to="coco"), "no such format of homes"),
+    ("Home.export", lambda g: g.home.export(""), "already exists"),
+    ("Frame.export", lambda g: g.frame.export("", to="coco"), "already exists"),
+    ("Frame.layer", lambda g: g.frame.layer(""), "no layer"),
 ]
 
 
@@ -304,9 +348,10 @@ def test_a_wrong_call_is_one_line_that_names_the_argument(
 
 def _public_calls() -> set[str]:
     """Names of all callables of the package with arguments."""
-    names = {"Packing", "SampleRequest"}
+    names = {"Packing", "SampleRequest", "Recipe", "Camera"}
     for name in (
         "film",
+        "generate_model",
         "load",
         "make",
         "model",
@@ -331,6 +376,26 @@ def _public_calls() -> set[str]:
 def test_every_public_call_has_wrong_ones_in_the_table() -> None:
     assert _public_calls() == {name for name, _call, _says in WRONG}
     assert len(WRONG) >= 95
+
+
+@pytest.mark.parametrize(
+    ("call", "says"),
+    [
+        (lambda g: pf.render(g.home, g.camera, mode="opengl_dl"), r"render\(\): .*mode.*modes"),
+        (lambda g: pf.render_homes(g.home, g.folder / "x", view=1), "'view'; did you mean views"),
+        (
+            lambda g: pf.render_homes(g.home, g.folder / "x", pair=True),
+            "'pair'; did you mean pairs",
+        ),
+        (lambda g: g.home.place(g.model, in_="Bedroom"), r"place\(\): .*'in_'; of model, on"),
+        (lambda g: g.home.move("sofa", to=(1, 1, 1)), r"move\(\): .*'to'"),
+    ],
+)
+def test_an_unknown_argument_names_the_function_and_near_names(
+    valid_arguments: SimpleNamespace, call: Call, says: str
+) -> None:
+    with pytest.raises(TypeError, match=says):
+        call(valid_arguments)
 
 
 WARNED: list[tuple[Call, str]] = [

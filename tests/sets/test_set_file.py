@@ -196,7 +196,7 @@ def test_a_shipped_set_loads(name: str) -> None:
         ('homes = ["made:1", "gone.sh3d"]', "", "part.views: .*gone.sh3d: no such file"),
         ('homes = ["NoSuchHome"]', "", "no example home of that name"),
         ('models = "gone"', "", "part.views: models: gone: no such folder"),
-        ('set = ["dress.style=bogus"]', "", "dress.style: bogus: no such style"),
+        ('set = ["dress.style=bogus"]', "", "style: bogus: no such style"),
         ('set = ["dress.catalogue=gone"]', "", "dress.catalogue: gone: no such file"),
         ('set = ["cameras.source=file", "cameras.file=gone.json"]', "", "gone.json: no such file"),
         (

@@ -53,7 +53,7 @@ def garbage(farm: Farm, keep_s: float, now_s: float) -> list[Garbage]:
     store and queries the age of each candidate.
     """
     store = farm.store
-    states = {job: _state_of_job(farm, job) for job in _jobs(store)}
+    states = {job: _state_of_job(farm, job) for job in jobs_in(store)}
     is_old = _older_than(store, now_s - keep_s)
     logs = _logs(store, [job for job, state in states.items() if state not in _LIVE])
     cancelled = _files_of(store, [job for job, state in states.items() if state == "cancelled"])
@@ -90,7 +90,8 @@ def remove(farm: Farm, groups: Iterable[Garbage]) -> int:
     return n
 
 
-def _jobs(store: Store) -> list[str]:
+def jobs_in(store: Store) -> list[str]:
+    """The jobs that a store has objects of."""
     ends = (key.split("/") for key in store.list("jobs/"))
     return sorted({parts[1] for parts in ends if len(parts) == 3 and parts[2] == "job.json"})
 

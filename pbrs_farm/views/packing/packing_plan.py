@@ -41,6 +41,8 @@ class Packing:
         for name in ("layers", "modes"):
             object.__setattr__(self, name, as_words(getattr(self, name)))
         check_fields(self)
+        if not self.layers:
+            raise BadInput("pack", "layers", "give at least one")
         for mode in self.modes:
             SampleRequest(self.layers, mode, size=self.size)  # raises BadInput for invalid values
         if self.colour not in COLOURS:

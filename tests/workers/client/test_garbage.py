@@ -9,6 +9,7 @@ from pathlib import Path
 
 import pytest
 
+from pbrs_farm.cli import main
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.recipe import recipe_from_name
@@ -87,3 +88,21 @@ def test_times_are_days_hours_and_weeks() -> None:
     for text in ("", "30", "d", "1y", "-1d", "1.5d"):
         with pytest.raises(BadInput, match="not a time"):
             keep_from_text(text)
+
+
+def test_a_folder_without_jobs_needs_no_redis(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setenv("PBRS_REDIS_URL", "redis://127.0.0.1:1/0")
+    files = tmp_path / "out/houses/a"
+    files.mkdir(parents=True)
+    (files / "left.png").write_bytes(b"left")
+    words = ["gc", "--store", str(tmp_path / "out"), "--keep", "0h"]
+    assert main(words) == 0
+    assert "houses/a/left.png" in capsys.readouterr().out
+    assert main([*words, "--yes"]) == 0
+    assert not (files / "left.png").exists()
+    (tmp_path / "out/jobs/j").mkdir(parents=True)
+    (tmp_path / "out/jobs/j/job.json").write_bytes(b"{}")
+    assert main(words) == 1
+    assert "no Redis" in capsys.readouterr().err
