@@ -14,8 +14,6 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 
-FACE_NAMES: Final = ("front", "right", "back", "left", "up", "down")
-
 # Rows of each face: its right, down and forward in the camera's axes (OpenCV's).
 FACE_AXES: Final[F64] = np.array(
     [

@@ -20,7 +20,6 @@ from pbrs_farm.core.record import read_toml
 if TYPE_CHECKING:
     from pbrs_farm.core.recipe_fields import ToneFields
 
-NEUTRAL: Final = "neutral"
 DRAWN: Final = "drawn"
 
 

@@ -7,7 +7,7 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.house import Material, MaterialKind
-from pbrs_farm.dress.style import METALS, WOODS, Rgb, Style, mix, shade
+from pbrs_farm.dress.style import METALS, Rgb, Style, mix, shade
 
 
 def plain(name: str, colour: Rgb, roughness: float) -> Material:
@@ -81,7 +81,6 @@ RUBBER: Final = plain("black rubber", (0.06, 0.06, 0.06), 0.7)
 CAST_IRON: Final = plain("cast black", (0.05, 0.05, 0.052), 0.6)
 EARTH: Final = plain("earth", (0.16, 0.11, 0.08), 0.95)
 WICKER: Final = plain("wicker", (0.66, 0.52, 0.36), 0.9)
-LIGHT_OAK: Final = plain("oak wood", WOODS["pale oak"].mean, 0.5)
 CLEAR: Final = glass()
 FROSTED: Final = glass((0.93, 0.96, 0.96), 0.35)
 OPAL: Final = Material("opal glass", MaterialKind.BULB)

@@ -223,7 +223,6 @@ PLANS: Final[dict[tuple[str, str], TrainingPlan]] = {
     )
 }
 # fmt: on
-PLAN_NAMES: Final = tuple(dict.fromkeys(name for name, _ in PLANS))
 
 
 def plan_of(task: str, name: str, overrides: dict[str, str] | None = None) -> TrainingPlan:

@@ -38,7 +38,6 @@ _UNFIT: Final = frozenset(
     ]
 )
 """Pieces that templates cannot use, each looked at."""
-_BEFORE_TABLE_M: Final = 0.05  # from which a chair is pushed in
 MAX_CHOICES = 6  # preferred pieces of a kind to try at every place
 
 

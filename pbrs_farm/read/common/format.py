@@ -4,8 +4,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from importlib import import_module
 from pathlib import Path
-from typing import Final, NamedTuple
+from typing import Any, Final, NamedTuple
 
 from pbrs_farm.core.data_format import DataFormat
 from pbrs_farm.core.errors import BadHouse
@@ -36,6 +37,12 @@ def root_of(given: GivenFile) -> tuple[RootFolder, str]:
     return RootFolder(root), name
 
 
+def deferred(place: str) -> Callable[..., Any]:
+    """A function that imports `module:function` when it is called, and calls it."""
+    module, _colon, name = place.partition(":")
+    return lambda *args: getattr(import_module(module), name)(*args)
+
+
 def no_companions(_given: GivenFile, _files: SourceFiles) -> str:
     """Of formats that read nothing beside their file."""
     return ""
@@ -48,12 +55,7 @@ class Format(DataFormat):
     The package of a format is imported to ask for this entry, so that it stays light: `read` and
     `companions` import the reader when they are called.
 
-        def _read(given: GivenFile, fields: ReadFields) -> House:
-            from pbrs_farm.read.usd import stage
-
-            return stage.read(given, fields)
-
-        FORMAT = Format(kind="usd", title="OpenUSD", suffixes=(".usd", ".usda"), read=_read, ...)
+        FORMAT = Format(kind="usd", read=deferred("pbrs_farm.read.usd.stage:read_usd"), ...)
     """
 
     kind: str  # of the SourceRef that names such a file

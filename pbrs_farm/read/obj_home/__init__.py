@@ -4,23 +4,7 @@ from __future__ import annotations
 
 import re
 
-from pbrs_farm.core.house import House
-from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.read.common.format import Format, GivenFile
-from pbrs_farm.read.common.source_files import SourceFiles
-
-
-def _read_obj(given: GivenFile, fields: ReadFields) -> House:
-    from pbrs_farm.read.obj_home import home
-
-    return home.read_obj_home(given, fields)
-
-
-def _companions_of_obj(given: GivenFile, files: SourceFiles) -> str:
-    from pbrs_farm.read.obj_home import home
-
-    return home.companions_of_obj_home(given, files)
-
+from pbrs_farm.read.common.format import Format, deferred
 
 # fmt: off
 FORMAT = Format(
@@ -30,6 +14,7 @@ FORMAT = Format(
     # a floor and a wall among its groups, wherever in the file; other files are single models
     lines=(b"g ", b"o "),
     contains=re.compile(rb"\A(?=[\s\S]*^[go] .*floor)(?=[\s\S]*^[go] .*wall)", re.IGNORECASE | re.MULTILINE),
-    read=_read_obj, companions=_companions_of_obj,
+    read=deferred("pbrs_farm.read.obj_home.home:read_obj_home"),
+    companions=deferred("pbrs_farm.read.obj_home.home:companions_of_obj_home"),
 )
 # fmt: on

@@ -4,23 +4,7 @@ from __future__ import annotations
 
 import re
 
-from pbrs_farm.core.house import House
-from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.read.common.format import Format, GivenFile
-from pbrs_farm.read.common.source_files import SourceFiles
-
-
-def _read_robot(given: GivenFile, fields: ReadFields) -> House:
-    from pbrs_farm.read.robot import home
-
-    return home.read_robot(given, fields)
-
-
-def _companions_of_robot(given: GivenFile, files: SourceFiles) -> str:
-    from pbrs_farm.read.robot import home
-
-    return home.companions_of_robot(given, files)
-
+from pbrs_farm.read.common.format import Format, deferred
 
 # fmt: off
 _SUFFIXES = (".urdf", ".sdf", ".world")
@@ -30,6 +14,8 @@ FORMAT = Format(
     licence="of each home", suffixes=_SUFFIXES, shared_suffixes=frozenset(_SUFFIXES),
     # a world, or a robot with a floor and a wall; other files are single models
     contains=re.compile(rb"<sdf\b[\s\S]*<world\b|<robot\b(?=[\s\S]*floor)(?=[\s\S]*wall)", re.IGNORECASE),
-    beside=("*.classes.json", "*.rooms.json"), read=_read_robot, companions=_companions_of_robot,
+    beside=("*.classes.json", "*.rooms.json"),
+    read=deferred("pbrs_farm.read.robot.home:read_robot"),
+    companions=deferred("pbrs_farm.read.robot.home:companions_of_robot"),
 )
 # fmt: on

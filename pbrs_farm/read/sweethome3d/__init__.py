@@ -4,23 +4,7 @@ from __future__ import annotations
 
 import re
 
-from pbrs_farm.core.house import House
-from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.read.common.format import Format, GivenFile
-from pbrs_farm.read.common.source_files import SourceFiles
-
-
-def _read_sweethome3d(given: GivenFile, fields: ReadFields) -> House:
-    from pbrs_farm.read.sweethome3d import packaged_home
-
-    return packaged_home.read_packaged_home(given, fields)
-
-
-def _companions_of_sweethome3d(given: GivenFile, files: SourceFiles) -> str:
-    from pbrs_farm.read.sweethome3d import packaged_home
-
-    return packaged_home.companions_of_home(given, files)
-
+from pbrs_farm.read.common.format import Format, deferred
 
 # fmt: off
 FORMAT = Format(
@@ -28,6 +12,7 @@ FORMAT = Format(
     brings="walls, rooms, furniture, lamps", where="sweethome3d.com, or your own",
     licence="of each home", suffixes=(".sh3d", ".sh3x", ".xml", ".zip"), shared_suffixes=frozenset({".xml", ".zip"}),
     contains=re.compile(rb"\A\s*(<\?xml[^>]*>\s*)?<home\b|\APK.{28}(Home|ContentDigests)", re.DOTALL),
-    read=_read_sweethome3d, companions=_companions_of_sweethome3d, uses_packages=True,
+    read=deferred("pbrs_farm.read.sweethome3d.packaged_home:read_packaged_home"),
+    companions=deferred("pbrs_farm.read.sweethome3d.packaged_home:companions_of_home"), uses_packages=True,
 )
 # fmt: on

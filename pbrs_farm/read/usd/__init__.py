@@ -5,25 +5,10 @@ from __future__ import annotations
 import re
 from typing import Any, Final
 
-from pbrs_farm.core.house import House
-from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.installation import need
-from pbrs_farm.read.common.format import Format, GivenFile
-from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.common.format import Format, GivenFile, deferred
 
 SUFFIXES: Final = (".usd", ".usda", ".usdc", ".usdz")
-
-
-def _read_usd(given: GivenFile, fields: ReadFields) -> House:
-    from pbrs_farm.read.usd import stage
-
-    return stage.read_usd(given, fields)
-
-
-def _companions_of_usd(given: GivenFile, files: SourceFiles) -> str:
-    from pbrs_farm.read.usd import stage
-
-    return stage.companions_of_usd(given, files)
 
 
 def scan_of_stage(given: GivenFile) -> dict[str, Any]:
@@ -43,6 +28,7 @@ FORMAT = Format(
     licence="of each data set", needs="the extra usd", library="pxr",
     suffixes=SUFFIXES, shared_suffixes=frozenset(SUFFIXES), contains=_NO_SCAN,
     beside=("*.classes.json", "*.rooms.json", "rooms.json"),
-    read=_read_usd, companions=_companions_of_usd,
+    read=deferred("pbrs_farm.read.usd.stage:read_usd"),
+    companions=deferred("pbrs_farm.read.usd.stage:companions_of_usd"),
 )
 # fmt: on

@@ -30,7 +30,6 @@ from pbrs_farm.read.usd.stage_files import (
     opened_stage,
 )
 
-_ARCHITECTURE: Final = "Arch_grp"
 _OBJECTS: Final = "Object_grp"
 _SECTIONS: Final = "Section_grp"
 _NUMBER: Final = re.compile(r"_?\d+$")
