@@ -109,17 +109,15 @@ class Caster:
         """Depth as of depth_pictures, and (N, H, W) uint32 instance id of the same hit; 0 = nothing."""
         if not cameras:
             return np.zeros((0, 0, 0), np.float32), np.zeros((0, 0, 0), np.uint32)
-        rays = [camera.rays() for camera in cameras]
-        directions = np.stack([d for _origin, d in rays])
-        origins = np.broadcast_to(np.stack([o for o, _d in rays])[:, None, None], directions.shape)
+        if self.tracer is None:
+            i = cameras[0].intrinsics
+            shape = len(cameras), i.height_px, i.width_px
+            return np.zeros(shape, np.float32), np.zeros(shape, np.uint32)
         # Directions are as long as makes the distance along a ray the depth.
-        t, face = self.first_hit(origins.reshape(-1, 3), directions.reshape(-1, 3))
-        is_hit = np.isfinite(t).reshape(directions.shape[:3]) & directions.any(-1)
-        depth = np.where(is_hit, t.reshape(is_hit.shape), np.float32(0))
-        if not len(self.geometry.face_item):
-            return depth, np.zeros(is_hit.shape, np.uint32)
-        items = self.geometry.face_item[face].reshape(is_hit.shape)
-        return depth, np.where(is_hit, items, np.uint32(0))
+        t, face = self.tracer.pictures(cameras)
+        is_hit = face >= 0
+        depth = np.where(is_hit, t, np.float32(0))
+        return depth, np.where(is_hit, self.geometry.face_item[face], np.uint32(0))
 
     def first_hit(
         self,

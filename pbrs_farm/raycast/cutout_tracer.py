@@ -17,7 +17,14 @@ from pbrs_farm.core.arrays import F32, F64, I32, I64, Bools
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.cutouts import CutOuts, faces_with_holes, pierced_holes
 from pbrs_farm.core.house import Geometry
-from pbrs_farm.raycast.tracer import RayTracer, counted_labels, faces_as_picture, rays_of_pixels
+from pbrs_farm.raycast.tracer import (
+    RayTracer,
+    counted_labels,
+    have_pin_holes,
+    pictures_by_rays,
+    pin_hole_rays,
+    rays_of_pixels,
+)
 
 _MOST_SHEETS: Final = (
     64  # maximum sheets with holes that a ray passes; after them only solid faces count
@@ -82,17 +89,23 @@ class CutOutTracer:
         counts = self._all.counts(cameras, labels, n_labels + 1)
         shows_holes = np.flatnonzero(counts[:, n_labels])
         for part in _batches(cameras, shows_holes):
-            rays = [rays_of_pixels(cameras[k]) for k in part]
-            origins, directions = (np.concatenate([r[i] for r in rays]) for i in (0, 1))
-            reach = np.full(len(origins), np.inf, np.float32)
-            _t, face = self.first_hit(origins, directions, reach)
-            ends = np.cumsum([len(r[1]) for r in rays])
-            for k, camera_faces, (_o, _d, blind) in zip(
-                part, np.split(face, ends[:-1]), rays, strict=True
-            ):
-                picture = faces_as_picture(camera_faces, cameras[k], blind)
-                counts[k, :n_labels] = counted_labels(picture, face_label, n_labels)
+            _t, faces = self.pictures([cameras[k] for k in part])
+            for k, face in zip(part, faces, strict=True):
+                counts[k, :n_labels] = counted_labels(face, face_label, n_labels)
         return np.ascontiguousarray(counts[:, :n_labels])
+
+    def pictures(self, cameras: Sequence[Camera]) -> tuple[F32, I32]:
+        if self._all is None or not have_pin_holes(cameras):
+            return pictures_by_rays(self, cameras)
+        t, face = self._all.pictures(cameras)
+        shape, t, face = face.shape, t.ravel(), face.ravel()
+        pixels = self._unsure(face)
+        if len(pixels):
+            which, pixel = np.divmod(pixels, shape[1] * shape[2])
+            rays = pin_hole_rays(cameras, which, pixel)
+            reach = np.full(len(pixels), np.inf, np.float32)
+            t[pixels], face[pixels] = self._past_holes(*rays, reach, face[pixels])
+        return t.reshape(shape), face.reshape(shape)
 
     def _unsure(self, face: I32) -> I64:
         return np.flatnonzero((face >= 0) & self._may_have_holes[face])
@@ -142,15 +155,16 @@ def _hits(tracer: RayTracer | None, origins: F32, directions: F32, reach: F32) -
 
 
 def _batches(cameras: Sequence[Camera], chosen: I64) -> Iterator[list[int]]:
-    """The chosen cameras in batches that bound the rays of a launch."""
+    """The chosen cameras in batches of one size that bound the rays of a launch."""
     batch: list[int] = []
-    n_rays = 0
+    size = (0, 0)
     for k in chosen.tolist():
         i = cameras[k].intrinsics
-        if batch and n_rays + i.width_px * i.height_px > _RAYS_AT_ONCE:
+        is_full = (len(batch) + 1) * i.width_px * i.height_px > _RAYS_AT_ONCE
+        if batch and (is_full or size != (i.width_px, i.height_px)):
             yield batch
-            batch, n_rays = [], 0
+            batch = []
         batch.append(k)
-        n_rays += i.width_px * i.height_px
+        size = i.width_px, i.height_px
     if batch:
         yield batch

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F32, I32, Bools
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.house import Geometry
-from pbrs_farm.raycast.tracer import RayTracer, counted_labels, rays_of_pixels
+from pbrs_farm.raycast.tracer import RayTracer, counted_labels, pictures_by_rays, rays_of_pixels
 
 Build = Callable[[F32, I32], RayTracer]  # positions (V, 3) and faces (F, 3) of a mesh -> its tracer
 
@@ -37,6 +37,10 @@ class PartTracer:
         self, cameras: Sequence[Camera], face_label: NDArray[np.uint32], n_labels: int
     ) -> NDArray[np.uint32]:
         return self._tracer.counts(cameras, face_label[self._numbers], n_labels)
+
+    def pictures(self, cameras: Sequence[Camera]) -> tuple[F32, I32]:
+        t, face = self._tracer.pictures(cameras)
+        return t, self._named(face)
 
     def _named(self, face: I32) -> I32:
         return np.where(face >= 0, self._numbers[face], np.int32(-1))
@@ -72,3 +76,6 @@ class NearestTracer:
         pictures = (self.faces_of_camera(camera) for camera in cameras)
         rows = [counted_labels(face, face_label, n_labels) for face in pictures]
         return np.array(rows, np.uint32).reshape(len(cameras), n_labels)
+
+    def pictures(self, cameras: Sequence[Camera]) -> tuple[F32, I32]:
+        return pictures_by_rays(self, cameras)

@@ -12,6 +12,7 @@ from pbrs_farm.core.camera import Camera
 from pbrs_farm.raycast.tracer import (
     counted_labels,
     faces_as_picture,
+    pictures_by_rays,
     rays_of_pixels,
     scene_from_mesh,
 )
@@ -50,3 +51,6 @@ class ScalarTracer:
         for row, camera in enumerate(cameras):
             counts[row] = counted_labels(self.faces_of_camera(camera), face_label, n_labels)
         return counts
+
+    def pictures(self, cameras: Sequence[Camera]) -> tuple[F32, I32]:
+        return pictures_by_rays(self, cameras)

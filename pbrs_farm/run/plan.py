@@ -44,7 +44,7 @@ STEPS: Final = {
     step.name: step
     for step in (
         Step("house", 1, per_view=False),
-        Step("cameras", 8, ("house",), per_view=False),
+        Step("cameras", 9, ("house",), per_view=False),
         Step("pairs", 2, ("house", "cameras"), per_view=False, needs=("house", "cameras")),
         Step("tracks", 3, ("house", "cameras"), per_view=False, needs=("house", "cameras")),
         Step("truth", 4, ("house", "cameras")),

@@ -28,11 +28,11 @@ from pbrs_farm.sample.paper_rules import rejections, room_grid
 from pbrs_farm.sample.photo_choice import PhotoChoice, RoomCandidates
 from pbrs_farm.sample.photo_score import (
     ItemRoles,
-    PhotoShares,
     cut_shares,
     foreground_cost,
     framing_cost,
     furniture_points,
+    item_pixels,
     item_roles,
     photo_score,
     photo_shares,
@@ -41,11 +41,11 @@ from pbrs_farm.sample.view_overlap import DEPTH_SIZE, ItemPictures
 
 Size = tuple[int, int]  # width and height of a picture, px
 
-TINY: Final = 0.225  # of the edges of a small picture: a twentieth of its pixels
+# Edges of small and tiny pictures, of those of a coarse picture (96 x 72 and 24 x 18 of 160 x 120).
+SMALL, TINY = 0.6, 0.15
 _LEAST_TINY_PX: Final = (
-    24  # minimum edge of a picture in which furniture and walls are distinguishable
+    16  # minimum edge of a picture in which furniture and walls are distinguishable
 )
-_TINY_DEPTH_SIZE: Final = (DEPTH_SIZE[0] // 2, DEPTH_SIZE[1] // 2)
 
 
 @dataclass(eq=False)
@@ -76,33 +76,35 @@ class PhotoSampler:
         none = np.zeros(n)
         placed = RoomCandidates(room, candidates, verdict, none, nothing, none, none)
         remaining = np.flatnonzero(verdict == Verdict.LOWER_SCORE)
-        return self.scored_from_pictures(placed, remaining, *self._first_sizes)
+        return self.scored_from_pictures(placed, remaining, self._first_size)
 
     def with_better_scores(self, rooms: Sequence[RoomCandidates]) -> list[RoomCandidates]:
         """Score the eligible candidates of all rooms again from small pictures; others lose their score."""
-        if self._first_sizes == self._sizes:
+        if self._first_size == self._size:
             return list(rooms)
         first = [replace(scored, verdict=scored.verdict.copy()) for scored in rooms]
         likely = PhotoChoice(self.fields, self._intrinsics(*DEPTH_SIZE), None).likely(first)
         return [
-            self.scored_from_pictures(scored, likely[scored.room.id], *self._sizes)
+            self.scored_from_pictures(scored, likely[scored.room.id], self._size)
             for scored in first
         ]
 
     def scored_from_pictures(
-        self, placed: RoomCandidates, which: NDArray[np.intp], size: Size, depth_size: Size
+        self, placed: RoomCandidates, which: NDArray[np.intp], size: Size
     ) -> RoomCandidates:
         """The candidates numbered by which (M,) with scores from pictures of a size; no other has one."""
         f, candidates = self.fields, placed.candidates
         cameras = candidates.cameras(which, self._intrinsics(*size))
-        small = [camera.with_size(*depth_size) for camera in cameras]
-        depth, seen_items = self.pictures_of(small)
-        cut = cut_shares(small, depth, seen_items, self._roles, self._points)
-        shares = self._shares(cameras, depth, cut)
-        # Used to find near-duplicates.
-        if depth_size == DEPTH_SIZE:
+        depth, seen_items = self.pictures_of(cameras)
+        counts = item_pixels(seen_items, self._n_items + 1)
+        if size == self._size:
+            # Depth that finds near-duplicates, too.
+            cameras, depth, seen_items = self._at_depth_size(cameras, depth, seen_items)
             names = [(placed.room.id, int(k)) for k in which]
-            self._looked_at |= dict(zip(names, zip(small, depth, strict=True), strict=True))
+            self._looked_at |= dict(zip(names, zip(cameras, depth, strict=True), strict=True))
+        cut = cut_shares(cameras, depth, seen_items, self._roles, self._points)
+        flat = depth.reshape(len(cameras), depth.shape[1] * depth.shape[2])
+        shares = photo_shares(counts, flat, self._roles, f.min_object_fraction, cut)
         # Rules about the picture come before any comparison of scores.
         rule = np.full(len(which), Verdict.LOWER_SCORE, np.uint8)
         overfilled = (shares.largest > f.max_item_fraction) | (shares.wall > f.max_wall_fraction)
@@ -169,24 +171,28 @@ class PhotoSampler:
         return len(self.house.items)
 
     @property
-    def _sizes(self) -> tuple[Size, Size]:
-        """Of small pictures and of their depth."""
-        return (self.fields.coarse_width_px, self.fields.coarse_height_px), DEPTH_SIZE
+    def _size(self) -> Size:
+        """Of small pictures."""
+        return self._of_coarse(SMALL)
 
     @property
-    def _first_sizes(self) -> tuple[Size, Size]:
-        """Of tiny pictures and of their depth; those of small ones where tiny ones would show nothing."""
-        width, height = (round(TINY * px) for px in self._sizes[0])
-        if min(width, height) < _LEAST_TINY_PX:
-            return self._sizes
-        return (width, height), _TINY_DEPTH_SIZE
+    def _first_size(self) -> Size:
+        """Of tiny pictures; that of small ones where tiny ones would show nothing."""
+        size = self._of_coarse(TINY)
+        return size if min(size) >= _LEAST_TINY_PX else self._size
 
-    def _shares(self, cameras: list[Camera], depth: F32, cut: tuple[F64, F64]) -> PhotoShares:
-        """Class shares in pictures of these cameras. depth: (N, H, W) of small ones; cut: of cut_shares."""
-        rows = [part for _which, part in count_items(self.counter, cameras, self._n_items)]
-        counts = np.concatenate([np.zeros((0, self._n_items + 1), np.uint32), *rows])
-        flat = depth.reshape(len(cameras), depth.shape[1] * depth.shape[2])
-        return photo_shares(counts, flat, self._roles, self.fields.min_object_fraction, cut)
+    def _of_coarse(self, part: float) -> Size:
+        f = self.fields
+        return round(part * f.coarse_width_px), round(part * f.coarse_height_px)
+
+    def _at_depth_size(
+        self, cameras: list[Camera], depth: F32, seen_items: NDArray[np.uint32]
+    ) -> tuple[list[Camera], F32, NDArray[np.uint32]]:
+        """Small pictures (N, H, W) at DEPTH_SIZE: each third pixel, if its centre is the same."""
+        small = [camera.with_size(*DEPTH_SIZE) for camera in cameras]
+        if depth.shape[1:] == (3 * DEPTH_SIZE[1], 3 * DEPTH_SIZE[0]):
+            return small, depth[:, 1::3, 1::3], seen_items[:, 1::3, 1::3]
+        return small, *self.pictures_of(small)
 
     def _intrinsics(self, width_px: int, height_px: int) -> Intrinsics:
         f = self.fields

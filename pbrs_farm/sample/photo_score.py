@@ -127,7 +127,7 @@ def item_roles(house: House) -> ItemRoles:
 
 
 def photo_shares(
-    counts: NDArray[np.uint32],
+    counts: NDArray[np.integer],
     depth_m: F32,
     roles: ItemRoles,
     least: float,
@@ -166,6 +166,13 @@ def photo_shares(
     )
 
 
+def item_pixels(seen_items: NDArray[np.uint32], n_ids: int) -> I64:
+    """(N, n_ids) pixels of each instance id in pictures (N, H, W)."""
+    n = len(seen_items)
+    name = np.arange(n)[:, None, None] * n_ids + seen_items  # of each item in each picture
+    return np.bincount(name.ravel(), minlength=n * n_ids).reshape(n, n_ids)
+
+
 def furniture_points(house: House) -> list[F64]:
     """Points on the surface of each instance that can be cut, (K, 3) in the world; none on rugs and structure."""
     none = np.zeros((0, 3))
@@ -195,7 +202,7 @@ def cut_shares(
         return np.zeros(0), np.zeros(0)
     n_ids = len(roles.nyu13)
     name = np.arange(n)[:, None, None] * n_ids + seen_items  # of each item in each picture
-    share = np.bincount(name.ravel(), minlength=n * n_ids) / max(height * width, 1)
+    share = item_pixels(seen_items, n_ids).ravel() / max(height * width, 1)
     is_close = np.zeros(n * n_ids, np.bool_)
     is_close[name[(depth_m > 0) & (depth_m < CLOSE_CUT_M)]] = True
     is_at_edge = np.zeros(n * n_ids, np.bool_)
@@ -205,20 +212,29 @@ def cut_shares(
     share = share.reshape(n, n_ids)
     close = np.where(is_cut & is_close.reshape(n, n_ids), share, 0).max(1, initial=0)
     cut = np.zeros(n)
-    for picture, item in np.argwhere(is_cut).tolist():
+    pixels = _pixel_matrices(cameras)
+    for item in np.flatnonzero(is_cut.any(0)).tolist():
         if len(points[item]):
-            away = 1 - _part_inside(cameras[picture], points[item])
-            cut[picture] += share[picture, item] * max(away - CUT_AWAY, 0.0) / (1 - CUT_AWAY)
+            which = np.flatnonzero(is_cut[:, item])
+            away = 1 - _parts_inside(pixels[which], points[item], width, height)
+            cut[which] += share[which, item] * np.maximum(away - CUT_AWAY, 0) / (1 - CUT_AWAY)
     return cut, np.asarray(close)
 
 
-def _part_inside(camera: Camera, points: F64) -> float:
-    """The part of points (K, 3) inside the picture, hidden or not."""
-    i = camera.intrinsics
-    local = (points - camera.eye) @ camera.world_from_camera[:3, :3]
-    z = np.maximum(-local[:, 2], 0)
-    x, y = i.cx * z + i.fx * local[:, 0], i.cy * z - i.fy * local[:, 1]
-    return float(((x > 0) & (x < i.width_px * z) & (y > 0) & (y < i.height_px * z)).mean())
+def _pixel_matrices(cameras: Sequence[Camera]) -> F32:
+    """(N, 3, 4) from a point in the world to its pixel: (x z, y z, z), z in metres in front of the eye."""
+    poses = np.stack([camera.world_from_camera for camera in cameras])
+    to_pixel = np.stack([c.intrinsics.k * np.array((1.0, -1, -1)) for c in cameras])
+    turned = to_pixel @ poses[:, :3, :3].swapaxes(1, 2)
+    return np.concatenate([turned, -turned @ poses[:, :3, 3:]], 2).astype(np.float32)
+
+
+def _parts_inside(pixels: F32, points: F64, width: int, height: int) -> F64:
+    """(N,) part of points (K, 3) inside each picture, hidden or not; pixels: of _pixel_matrices."""
+    projected = pixels[:, :, :3] @ points.T.astype(np.float32) + pixels[:, :, 3:]
+    x, y, z = projected.swapaxes(0, 1)
+    inside = (z > 0) & (x > 0) & (x < width * z) & (y > 0) & (y < height * z)
+    return np.asarray(inside.mean(1))
 
 
 def _median_depth(depth_m: F32) -> F64:

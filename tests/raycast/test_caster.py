@@ -1,11 +1,14 @@
 """The ray caster against closed forms, against brute force, and against itself."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
 
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.house import Geometry
+from pbrs_farm.core.lenses import Lens
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.raycast.hit_records import hit_record_from_faces
 from tests.raycast.scenes import camera, geometry, soup, wall
@@ -96,6 +99,26 @@ def test_item_counts_are_the_item_buffers_pixels(variant: str) -> None:
     for row, view in zip(counts, views, strict=True):
         expected = np.bincount(caster.item_buffer(view).ravel(), minlength=201)
         assert np.abs(row.astype(int) - expected).sum() <= 2  # rays through an edge
+
+
+def test_small_pictures_of_many_lenses_are_the_hit_records_depth_and_items(
+    variant: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    caster = Caster(soup(200, seed=3), variant=variant)
+    monkeypatch.setattr("pbrs_farm.raycast.tracer.RAYS_PER_LAUNCH", 1500)
+    views = [camera(37, 29, eye=(0, 0, z)) for z in (-1.0, 1.0, 4.0)]
+    views[1] = replace(views[1], intrinsics=views[1].intrinsics.zoomed(1.2))
+    fisheye = replace(
+        views[0], intrinsics=replace(views[0].intrinsics, lens=Lens("fisheye", (0.0,) * 4, 0.3))
+    )
+    for cameras in (views, [*views, fisheye]):
+        depth, items = caster.item_pictures(cameras)
+        for k, view in enumerate(cameras):
+            hit = caster.hit_record(view)
+            same = items[k] == hit.item
+            assert (~same).sum() <= 2  # rays through an edge
+            if view is not fisheye:
+                np.testing.assert_allclose(depth[k][same], hit.depth_z[same], rtol=1e-4)
 
 
 def test_counts_do_not_depend_on_how_cameras_are_batched(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -113,6 +115,14 @@ def test_counts_are_those_of_the_pictures() -> None:
         expected = np.bincount(caster.item_buffer(cam).ravel(), minlength=3)
         assert np.abs(row.astype(int) - expected).max() <= 2
         assert row.sum() == expected.sum()
+    wide = replace(away, intrinsics=away.intrinsics.zoomed(0.5))
+    cameras = [near_camera().with_size(80, 60), wide, away]
+    depth, items = caster.item_pictures(cameras)
+    for k, cam in enumerate(cameras):
+        hit = caster.hit_record(cam)
+        assert (items[k] != hit.item).sum() <= 2
+        same = items[k] == hit.item
+        np.testing.assert_allclose(depth[k][same], hit.depth_z[same], rtol=1e-4)
 
 
 def test_faces_that_are_skipped_may_have_holes() -> None:

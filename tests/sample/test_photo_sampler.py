@@ -10,6 +10,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.classes import NYU13_NAMES
 from pbrs_farm.core.house import House, ItemKind, geometry_from_house
@@ -258,18 +259,18 @@ def test_few_candidates_are_looked_at_in_small_pictures_and_the_best_are_among_t
         update={"coarse_width_px": 160, "coarse_height_px": 120, "cell_m": 0.25}
     )
 
-    def counted(cameras: Sequence[Camera]) -> NDArray[np.uint32]:
+    def looked_at(cameras: Sequence[Camera]) -> tuple[F32, NDArray[np.uint32]]:
         i = cameras[0].intrinsics
         n_looks[i.width_px, i.height_px] += len(cameras)
-        return caster.item_counts(cameras)
+        return caster.item_pictures(cameras)
 
-    sampler = PhotoSampler(house, fields, 0, counted, caster.item_pictures, geometry)
+    sampler = PhotoSampler(house, fields, 0, caster.item_counts, looked_at, geometry)
     tiny = [sampler.room_candidates(house.rooms[0])]
     few = sampler.with_better_scores(tiny)
-    assert 0 < 4 * n_looks[160, 120] < n_looks[36, 27]
+    assert 0 < 4 * n_looks[96, 72] < n_looks[24, 18]
     # Compare with the choice among all candidates, each rendered as a small picture.
     left_over = np.flatnonzero(np.isfinite(tiny[0].score))
-    scored = sampler.scored_from_pictures(tiny[0], left_over, (160, 120), DEPTH_SIZE)
+    scored = sampler.scored_from_pictures(tiny[0], left_over, (96, 72))
     by_all, by_few = sampler.choose([scored]), sampler.choose(few)
     score = scored.score
     assert sum(map(len, by_few.values())) == sum(map(len, by_all.values())) > 2
