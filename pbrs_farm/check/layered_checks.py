@@ -26,7 +26,9 @@ _STEP = 1e-5  # behind a crossing, relative to the largest coordinate plus 1 m
 _APART_MM = 0.1  # along the ray: nearer surfaces are one
 _ROUNDING_MM, _SLANT_MM, _MOST_SLANT_MM = 0.505, 2e-3, 5.0
 _SATURATED_MM = 65535
-_MOST_TRIED = 1000  # pixels for which every triangle of the stored instances is asked
+_MOST_TRIED = (
+    1000  # pixels, or a twentieth, for which every triangle of the stored instances is asked
+)
 _JITTER_PX = 0.02 * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, -1]])
 
 
@@ -63,7 +65,7 @@ def check_depth_layers(case: ViewCase) -> None:
         right[k] = _explained(case, stored.some(k), faces, origin, directions[k])
         if (dx, dy) == (0, 0):
             ties = ~right
-    for one in np.nonzero(~right)[0][:_MOST_TRIED, None]:
+    for one in np.nonzero(~right)[0][: max(_MOST_TRIED, len(rows) // 20), None]:
         k = one[0]
         faces = _pierced_faces(case, stored.instance[k], origin, directions[k])
         right[one] = _explained(case, stored.some(one), faces[None], origin, directions[one])

@@ -236,7 +236,7 @@ def _check_holes(case: ViewCase, name: str, sensor: str, seen: _Seen) -> None:
         measured = case.arrays[sensor] > 0
         by_material = np.isin(stored, (0, _CLEAR, _MIRROR, _TOO_DARK))
         right &= np.where(measured, by_material, stored > 0)
-    case.tally.pixels(f"{name}: reasons", case.place, right)
+    case.tally.pixels("depth holes", f"{case.place}/{name}.png", right)
 
 
 def _sensor_reach(sensor: str) -> tuple[float, float]:

@@ -8,7 +8,6 @@ from __future__ import annotations
 
 import functools
 import math
-from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any, Final
 
@@ -86,7 +85,7 @@ class Intrinsics:
 
 
 def intrinsics_from_k(
-    size: tuple[int, int] | None, k: Any, hfov_deg: float, distortion: Sequence[float] = ()
+    size: tuple[int, int] | None, k: Any, hfov_deg: float, distortion: Any = ()
 ) -> Intrinsics:
     """Intrinsics of a picture of (width, height) from K (3, 3), or from a field of view.
 
@@ -96,7 +95,7 @@ def intrinsics_from_k(
     not positive, and for a K of another picture size. distortion: as of `lens_of_opencv`; a lens that folds the
     picture raises BadInput, too.
     """
-    if len(distortion):
+    if np.size(distortion):
         return distorted_intrinsics(intrinsics_from_k(size, k, hfov_deg), distortion)
     if size is None and k is not None:
         raise BadInput("camera", "size", "is missing", hint="the picture size for K")
@@ -116,11 +115,11 @@ def intrinsics_from_k(
     return Intrinsics(width, height, fx, fy, cx, cy)
 
 
-def distorted_intrinsics(pinhole: Intrinsics, distortion: Sequence[float]) -> Intrinsics:
+def distorted_intrinsics(pinhole: Intrinsics, distortion: Any) -> Intrinsics:
     """The intrinsics with OpenCV's coefficients; BadInput for a wrong number of them, or for a fold."""
     try:
         intrinsics = replace(pinhole, lens=lens_of_opencv(distortion))
-    except ValueError as error:
+    except (TypeError, ValueError) as error:
         raise BadInput("camera", "distortion", str(error)) from None
     fold = fold_of(intrinsics)
     if fold is not None:
@@ -244,7 +243,7 @@ class Camera:
         hfov_deg: float = 60.0,
         K: Any = None,
         up: Vector = (0.0, 1.0, 0.0),
-        distortion: Sequence[float] = (),
+        distortion: Any = (),
     ) -> Camera:
         """A camera at eye that looks at target, world metres, y up.
 
@@ -277,7 +276,7 @@ class Camera:
         *,
         size: Size | None = None,
         hfov_deg: float = 60.0,
-        distortion: Sequence[float] = (),
+        distortion: Any = (),
     ) -> Camera:
         """A camera from a (4, 4) pose with OpenCV's axes: x right, y down, z forward; metres, y up.
 

@@ -159,19 +159,20 @@ def lens_from_table(table: Mapping[str, Any]) -> Lens:
     return Lens(model, coefficients, float(table.get("max_angle_rad", math.pi)))
 
 
-def lens_of_opencv(numbers: Sequence[float]) -> Lens:
+def lens_of_opencv(numbers: Sequence[float] | F64) -> Lens:
     """The lens of OpenCV's distortion coefficients, in its order; a pinhole if all are 0.
 
-    numbers: 4, 5, 8, 12 or 14 (k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tau_x tau_y), of points at z = 1, tau in rad.
+    numbers: 4, 5, 8, 12 or 14, of any shape (k1 k2 p1 p2 k3 k4 k5 k6 s1 s2 s3 s4 tau_x tau_y), of points at z = 1, tau in rad.
     Raises ValueError for another number of them or one that is not finite.
 
         >>> lens_of_opencv([-0.2, 0.03, 0.001, -0.002]).model
         'radtan'
     """
-    if len(numbers) not in _NUMBERS_OF_OPENCV or not all(map(math.isfinite, numbers)):
-        raise ValueError(f"expected 4, 5, 8, 12 or 14 finite numbers, got {list(numbers)}")
-    if not any(numbers):
+    values = np.asarray(numbers, np.float64).ravel().tolist()
+    if len(values) not in _NUMBERS_OF_OPENCV or not all(map(math.isfinite, values)):
+        raise ValueError(f"expected 4, 5, 8, 12 or 14 finite numbers, got {values}")
+    if not any(values):
         return PINHOLE
-    model: LensModel = "opencv" if any(numbers[5:]) else "radtan"
-    padded = [*map(float, numbers), *([0.0] * _NUMBERS_OF_OPENCV[-1])]
+    model: LensModel = "opencv" if any(values[5:]) else "radtan"
+    padded = [*values, *([0.0] * _NUMBERS_OF_OPENCV[-1])]
     return Lens(model, tuple(padded[: len(COEFFICIENTS[model])]))

@@ -528,10 +528,10 @@ _FINISHED: dict[str, tuple[Plant, str]] = {
     "instance of a surface exchanged": (picture("depth_layers/instance.png", other_surface), "depth layers"),
     "clear surfaces opaque": (picture("depth_layers/clear.png", scaled(0)), "depth layers"),
     **{
-        f"{name}'s holes exchanged": (picture(f"depth_hole{name}.png", exchanged_holes), f"depth_hole{name}: reasons")
+        f"{name}'s holes exchanged": (picture(f"depth_hole{name}.png", exchanged_holes), "depth holes")
         for name in ("", "_tof", "_stereo", "_d455", "_azure", "_l515")
     },
-    "a hole hidden": (picture("depth_hole_tof.png", lambda a: np.where(a == 1, 0, a)), "depth_hole_tof: reasons"),
+    "a hole hidden": (picture("depth_hole_tof.png", lambda a: np.where(a == 1, 0, a)), "depth holes"),
     "light mirrored": (picture("mlt_il_ol.png", mirrored), "light developed"),
     "light brightened": (picture("mlt_il_ol.png", scaled(1.05)), "light developed"),
     "light patched": (picture("mlt_ol.png", patch(20)), "light developed"),

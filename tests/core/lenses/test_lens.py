@@ -110,6 +110,12 @@ def test_a_camera_takes_opencvs_numbers_or_says_why_not() -> None:
     assert [lens.model for lens in models.values()] == ["radtan"] * 2 + ["opencv"] * 3
     assert models[14].coefficients[-1] == models[12].coefficients[11] == 0.01
     assert lens_of_opencv([0.0] * 14).is_pinhole
+    assert (
+        Camera.look_at(**look, distortion=np.full((1, 5), 0.01)).intrinsics.lens.coefficients
+        == (0.01,) * 5
+    )
+    with pytest.raises(BadInput, match="distortion"):
+        Camera.look_at(**look, distortion=["much"] * 4)
     assert len(COEFFICIENTS["opencv"]) == 14
     with pytest.raises(BadInput, match=r"4, 5, 8, 12 or 14 finite numbers"):
         Camera.look_at(**look, distortion=[0.1] * 6)
