@@ -56,7 +56,7 @@ def misconf(server: RedisServer) -> Iterator[None]:
 def busy(server: RedisServer) -> Iterator[None]:
     """A script on the server does not end."""
     client = server.client
-    with configured(server, "busy-reply-threshold", "10"):
+    with configured(server, "lua-time-limit", "10"):
         script = threading.Thread(target=_endless, args=(server,))
         script.start()
         wait(lambda: _is_busy(client), "a script holds it")

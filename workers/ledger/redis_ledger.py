@@ -495,7 +495,9 @@ class RedisLedger:
         except RefusedForNow as error:
             is_full = error.prefix == "OOM"
             hint = "raise maxmemory" if is_full else "wait, or see the log of Redis"
-            raise LedgerUnavailable(f"{self._where} refused: {error}", hint=hint) from error
+            # Redis 6 writes the script and its line before the prefix.
+            text = error.prefix + str(error).partition(error.prefix)[2]
+            raise LedgerUnavailable(f"{self._where} refused: {text}", hint=hint) from error
         except (redis.ConnectionError, redis.TimeoutError) as error:
             hint = "is it running? see PBRS_REDIS_URL"
             raise LedgerUnavailable(f"no Redis at {self._where}: {error}", hint=hint) from error
