@@ -35,6 +35,7 @@ if TYPE_CHECKING:
 _GENERATED_BY: Final = "home: made by pbrs_farm, CC0"
 _GROUPS_OF_PLUGINS: Final = frozenset({"read", "dress", "repair"})  # fields that its homes may set
 
+Licences: TypeAlias = "tuple[str, ...]"
 Finish: TypeAlias = "Callable[[SourceRef, Recipe], FinishedHouse]"
 
 
@@ -43,7 +44,8 @@ class HomeKind:
     """A kind of homes named by words of a command line.
 
     name: SourceRef.kind. is_word: true for a word of the kind. words: one word for each home of a word.
-    source: the source of a word, with the digests of its files. read: the house in its source's state.
+    source: the source of a word, with the digests of its files. read: the house in its source's state, its
+    furniture from libraries of these licences, () for any.
     finish: for a plugin, instead of `read`: the house after all passes; its function argument finishes
     another source. is_home: False for an object without context, which has no walls to repair and is
     never dressed. is_of_package: made from an installed package, so that another version of the package
@@ -52,7 +54,7 @@ class HomeKind:
 
     name: str
     source: Callable[[str, SourceFiles], SourceRef]
-    read: Callable[[SourceRef, ReadFields], House] | None = None
+    read: Callable[[SourceRef, ReadFields, Licences], House] | None = None
     finish: Callable[[SourceRef, Recipe, Finish], FinishedHouse] | None = None
     is_word: Callable[[str], bool] = lambda _word: False
     words: Callable[[str], list[str]] = lambda word: [word]
@@ -68,7 +70,7 @@ def _builtin_source(word: str, _files: SourceFiles) -> SourceRef:
     return SourceRef(kind="builtin", location=word, house_id=home.id, sha256=home.source.sha256)
 
 
-def _read_builtin(_source: SourceRef, _fields: ReadFields) -> House:
+def _read_builtin(_source: SourceRef, _fields: ReadFields, _licences: Licences) -> House:
     from pbrs_farm.read.builtin.builtin_home import builtin_home
 
     return builtin_home()
@@ -92,7 +94,7 @@ def _example_source(name: str, _files: SourceFiles) -> SourceRef:
     )
 
 
-def _read_example(source: SourceRef, fields: ReadFields) -> House:
+def _read_example(source: SourceRef, fields: ReadFields, _licences: Licences) -> House:
     from pbrs_farm.read.sweethome3d.packaged_home import read_example
 
     return read_example(source.location, fields)
@@ -128,13 +130,13 @@ def _made_source(word: str, _files: SourceFiles) -> SourceRef:
     )
 
 
-def _read_made(source: SourceRef, fields: ReadFields) -> House:
+def _read_made(source: SourceRef, fields: ReadFields, licences: Licences) -> House:
     from pbrs_farm.generate.generated_home import generate_home
     from pbrs_farm.prepare.generated_house import house_of_contents
 
     home = _made_home(source.location)
     # An empty home needs no package, so it also works where packages cannot be read.
-    catalogue = catalogue_of_words("") if home.furniture else EMPTY
+    catalogue = catalogue_of_words("", licences) if home.furniture else EMPTY
     contents = generate_home(home, catalogue).contents
     house = house_of_contents(contents, f"{home.name}.sh3d", source.sha256, fields)
     credit = house.source.attribution.replace("pbrs_farm", _GENERATED_BY, 1)
@@ -190,7 +192,7 @@ def _model_of_object(location: str) -> ObjectModel:
     return checked(ObjectModel, location.encode(), location[:80], error=BadHouse)
 
 
-def _read_object(source: SourceRef, fields: ReadFields) -> House:
+def _read_object(source: SourceRef, fields: ReadFields, _licences: Licences) -> House:
     from pbrs_farm.read.objects.single_object import read_object
 
     model = _model_of_object(source.location)

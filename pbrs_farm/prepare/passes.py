@@ -161,7 +161,7 @@ def _read_depends(source: SourceRef, recipe: Recipe) -> list[object]:
         return [PLANS_VERSION]
     kind = HOME_KIND.get(source.kind)
     if kind is None or kind.finish is None:
-        return []
+        return [*recipe.dress.licences] if source.kind == "made" else []
     # The passes of a plugin's home are unknown before it is made, so all versions count.
     return [versions_of_passes(), recipe.digest("dress")]
 
@@ -207,7 +207,7 @@ def _read(work: Preparation) -> Preparation:
         return replace(work, current=house, report=report, dressing=dressing)
     # An object without context has no walls to close and no rooms.
     is_whole = kind is not None and not kind.is_home
-    house = read_house(source, recipe.read)
+    house = read_house(source, recipe.read, recipe.dress.licences)
     house = house if is_whole else with_uses(house)
     unrepaired = RepairReport(house_id=house.id, was_repaired=True) if is_whole else None
     return replace(work, current=house, report=unrepaired)

@@ -20,21 +20,23 @@ from pbrs_farm.regular_files import naming_kind
 _FAR_M: Final = 100.0  # metres from every room: probably a wrong unit
 
 
-def read_house(source: SourceRef, fields: ReadFields) -> House:
+def read_house(source: SourceRef, fields: ReadFields, licences: tuple[str, ...] = ()) -> House:
     """The house as its source gives it, unrepaired, with notes on items far from every room.
+
+    licences: of the library furniture of a generated home; () for any.
 
     Raises BadHouse with the place, also if a file of the source has changed since it was named;
     BadInput for a plan, naming the room or opening; MachineFailed if a package or a plugin is not
     the one that the source was named with. Not for homes of plugins, which are finished.
     """
     check_unchanged(source)
-    return _with_far_noted(_house_of(source, fields), fields)
+    return _with_far_noted(_house_of(source, fields, licences), fields)
 
 
-def _house_of(source: SourceRef, fields: ReadFields) -> House:
+def _house_of(source: SourceRef, fields: ReadFields, licences: tuple[str, ...]) -> House:
     kind = HOME_KIND.get(source.kind)
     if kind is not None and kind.read is not None:
-        return kind.read(source, fields)
+        return kind.read(source, fields, licences)
     entry = format_of_source(source)
     if entry is None:
         raise BadHouse(source.location, "", f"unsupported kind: {source.kind}")

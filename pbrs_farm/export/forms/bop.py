@@ -272,12 +272,8 @@ def _write_json(path: Path, document: Any) -> None:
 FORM = ViewForm(
     "bop",
     write_bop,
-    "poses of placed models in the layout of the BOP challenge: `models/obj_<6 digits>.ply` and"
-    " `models_info.json` in mm, `camera.json`, `train_pbr/<scene>/` with `rgb`, `depth`, `mask`,"
-    " `mask_visib`, `scene_camera.json`, `scene_gt.json`, `scene_gt_info.json`,"
-    " `scene_gt_coco.json`; a scene is a home",
+    "poses of placed models in the layout of the BOP challenge: `models` in mm, `camera.json`, `train_pbr/<scene>/`"
+    " with `rgb`, `depth`, `mask`, `mask_visib`, `scene_*.json`; a scene is a home",
     lenses=("pinhole",),
-    convention=Convention(
-        0, axes="camera x right, y down, z forward; mm", depth="mm, along the axis"
-    ),
+    convention=Convention(0, axes="OpenCV's; mm", depth="mm, along the axis"),
 )

@@ -155,5 +155,5 @@ FORM = ViewForm(
     "`annotations.json` (NYU40 categories, compressed run lengths), `images/<house>/<view>.png`;"
     " panoptic: `panoptic.json`, `panoptic/<house>/<view>.png` (id = R + 256 G + 65536 B)",
     has_classes=True,
-    convention=Convention(0.5, axes="camera x right, y down, z forward"),
+    convention=Convention(0.5, axes="OpenCV's"),
 )

@@ -143,5 +143,5 @@ FORM = ViewForm(
     write_colmap,
     "a text model: cameras, images, points from depth; of a rig also rigs and frames",
     lenses=("pinhole", "radtan", "opencv", "fisheye"),
-    convention=Convention(0.5, axes="camera x right, y down, z forward; the home's world, y up, m"),
+    convention=Convention(0.5, axes="OpenCV's; world y up, m"),
 )

@@ -118,7 +118,7 @@ def _depth_pictures(frames: list[ChosenView]) -> Iterator[NDArray[np.uint8]]:
 FORM = ViewForm(
     "cosmos",
     write_cosmos,
-    "Cosmos Transfer: `depth.jsonl`, `seg.jsonl` (a film a line, with captions), `videos`, `depth` and `seg` (MP4; extra `video`)",
+    "Cosmos Transfer: `depth.jsonl`, `seg.jsonl` (films and captions), `videos`, `depth`, `seg` (extra `video`)",
     lenses=("pinhole",),
     is_of_frames=True,
     convention=Convention(None, axes="", depth="nearest depth over depth, 8 bit"),

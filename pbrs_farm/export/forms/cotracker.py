@@ -119,14 +119,12 @@ def _places(coords: F64, depth_m: NDArray[np.float32], frames: list[ChosenView])
 FORM = ViewForm(
     "cotracker",
     write_cotracker,
-    "CoTracker3's Kubric folders: `<house>/<house>.npy` (`coords`, `visibility`, `traj_3d`, `intrinsics`, `matrix_world`, `depth_range`),"
-    " `frames`, `depth`; films rendered with `--tracks`; `--reader tapip3d` puts depth beside the frames",
+    "CoTracker3's Kubric folders: `<house>/<house>.npy`, `frames`, `depth`; of films with `--tracks`;"
+    " `--reader tapip3d` puts depth beside the frames",
     options=CoTrackerOptions,
     lenses=("pinhole",),
     is_of_frames=True,
     convention=Convention(
-        0.5,
-        axes="camera x right, y up, z backward; the home's world, y up, m",
-        depth="16 bit between two distances along the ray",
+        0.5, axes="OpenGL's; world y up, m", depth="16 bit between two distances along the ray"
     ),
 )

@@ -100,8 +100,7 @@ def digits_of_disparity(disparity: F64) -> NDArray[np.uint8]:
 FORM = ViewForm(
     "fsd",
     write_fsd,
-    "FoundationStereo's pairs: `<house>/dataset/data/left/rgb`, `right/rgb` (JPEG), `left/disparity` ((255 x 255 R + 255 G + B) / 1000 px),"
-    " `left/intrinsics` (K, baseline), `index.txt`",
+    "FoundationStereo's pairs: `<house>/dataset/data/left/rgb`, `right/rgb`, `left/disparity`, `left/intrinsics`, `index.txt`",
     lenses=("pinhole",),
     layers=("depth_z", "disparity"),
     convention=Convention(0, axes="", depth="1000 steps a px of disparity"),

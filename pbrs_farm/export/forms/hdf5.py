@@ -89,8 +89,6 @@ FORM = ViewForm(
     " `category_id_segmaps`, `instance_segmaps`, `instance_attribute_maps`, `campose` (with `cam_K`); `index.jsonl`",
     has_classes=True,
     convention=Convention(
-        0,
-        axes="camera x right, y up, z backward; the home's world, y up, m",
-        depth="m, along the axis (`depth` unless pin-hole)",
+        0, axes="OpenGL's; world y up, m", depth="m, along the axis (`depth` unless pin-hole)"
     ),
 )

@@ -352,13 +352,10 @@ def _is_usual(row: Mapping[str, str], usual: F64) -> bool:
 FORM = ViewForm(
     "hypersim",
     write_hypersim,
-    "the layout of Hypersim (extra `selection`): `ai_VVV_NNN/images/scene_cam_XX_{final_hdf5,final_preview,geometry_hdf5}`,"
-    " `_detail` with cameras and boxes, `metadata_images_split_scene_v1.csv`, `metadata_camera_parameters.csv`;"
-    " also our `index.csv` and `README.md`; with `--split` one root whose table has the splits",
+    "[Hypersim's layout](../howto/trainers.md#hypersims-layout) (extra `selection`), with our `index.csv` and `README.md`;"
+    " with `--split` one root whose table has the splits",
     finish=join_splits,
     lenses=("pinhole",),
     reads_radiance=True,
-    convention=Convention(
-        0.5, axes="camera x right, y up, z backward; world z up, m", depth="m, along the ray"
-    ),
+    convention=Convention(0.5, axes="OpenGL's; world z up, m", depth="m, along the ray"),
 )

@@ -96,13 +96,10 @@ def join_lists(out: Path, splits: tuple[str, ...], _choice: Choice) -> None:
 FORM = ViewForm(
     "interiorverse",
     write_interiorverse,
-    "InteriorVerse: `<house>/<3 digits>_im.exr`, `_albedo`, `_material` (roughness, metallic), `_normal`, `_depth` (mm), `_mask`;"
-    " `train.txt`, `index.csv`",
+    "InteriorVerse: `<house>/<3 digits>_im.exr`, `_albedo`, `_material`, `_normal`, `_depth`, `_mask`; `train.txt`, `index.csv`",
     finish=join_lists,
     lenses=("pinhole",),
     layers=("roughness",),
     reads_radiance=True,
-    convention=Convention(
-        None, axes="camera x right, y up, z backward", depth="mm, along the axis"
-    ),
+    convention=Convention(None, axes="OpenGL's", depth="mm, along the axis"),
 )

@@ -110,6 +110,6 @@ FORM = ViewForm(
     lenses=("pinhole",),
     layers=("disparity", "flow_forward"),
     convention=Convention(
-        0, axes="left camera x right, y down, z forward; m", depth="256 steps a px of disparity"
+        0, axes="OpenCV's of the left camera, m", depth="256 steps a px of disparity"
     ),
 )

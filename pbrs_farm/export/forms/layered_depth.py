@@ -71,7 +71,7 @@ def front_depths(
 FORM = ViewForm(
     "layered-depth",
     write_layered_depth,
-    "LayeredDepth: `<i>.png`, `<i>_1.png`, `_3`, `_5`, `_7` (uint16 mm), `index.csv`; of views with `depth_layers`, its `_instance` and `_clear`",
+    "LayeredDepth: `<i>.png`, `<i>_1.png`, `_3`, `_5`, `_7`, `index.csv`",
     lenses=("pinhole",),
     layers=("depth_layers",),
     convention=Convention(None, axes="", depth="mm, along the axis"),

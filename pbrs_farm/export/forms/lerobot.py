@@ -259,13 +259,8 @@ def _write_table(file: Path, columns: dict[str, list[Any]], schema: pa.Schema | 
 FORM = ViewForm(
     "lerobot",
     write_lerobot,
-    "LeRobot v3: an episode a walk, of each camera `observation.images.<camera>`, `_depth` (TIFF, mm), `observation.<camera>.K`, `.pose`;"
-    " `data`, `meta`",
+    "LeRobot v3: an episode a walk, of each camera `observation.images.<camera>`, `_depth`, `observation.<camera>.K`, `.pose`",
     lenses=("pinhole",),
     is_of_frames=True,
-    convention=Convention(
-        0,
-        axes="camera x right, y down, z forward; the home's world, y up, m",
-        depth="mm, along the axis",
-    ),
+    convention=Convention(0, axes="OpenCV's; world y up, m", depth="mm, along the axis"),
 )

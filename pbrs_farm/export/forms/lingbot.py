@@ -73,8 +73,7 @@ def _readings(view: ChosenView, sensor: str) -> NDArray[np.uint16]:
 FORM = ViewForm(
     "lingbot",
     write_lingbot,
-    "LingBot-Depth: `<house>/<view>/rgb.png`, `raw_depth.png` (a sensor's, with holes), `depth.png` (uint16 mm), `intrinsics.txt`;"
-    " of views with a `depth_sensor` layer (`--sensor`), and its `depth_hole`",
+    "LingBot-Depth: `<house>/<view>/rgb.png`, `raw_depth.png` (of `--sensor`, with holes), `depth.png`, `intrinsics.txt`",
     options=LingbotOptions,
     lenses=("pinhole",),
     layers=SENSORS,

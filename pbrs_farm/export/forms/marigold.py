@@ -115,12 +115,9 @@ def name_lists_by_split(out: Path, splits: tuple[str, ...], _choice: Choice) -> 
 FORM = ViewForm(
     "marigold",
     write_marigold,
-    "`<house>/rgb_<view>.png`, `depth_<view>.png` (uint16 mm), `normal_<view>.npy` (float32) and lists of them,"
-    " `filename_list.txt` (`rgb depth`), `filename_list_normals.txt` (`rgb normal`); of views with `albedo`, `shading`, `residual` `filename_list_iid_lighting.txt`,"
-    " with `albedo`, `roughness`, `metallic` `filename_list_iid_appearance.txt`; with `--split` `train/filename_list_train.txt`",
+    "`<house>/rgb_<view>.png`, `depth_<view>.png` (uint16 mm), `normal_<view>.npy`, intrinsic parts, and lists of them;"
+    " with `--split` `train/filename_list_train.txt`",
     finish=name_lists_by_split,
     lenses=("pinhole", "radtan", "opencv"),
-    convention=Convention(
-        None, axes="camera x right, y up, z backward", depth="mm, along the axis"
-    ),
+    convention=Convention(None, axes="OpenGL's", depth="mm, along the axis"),
 )

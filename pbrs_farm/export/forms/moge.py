@@ -79,9 +79,7 @@ def logarithmic_png(metres: F64, is_infinite: Bools) -> bytes:
 FORM = ViewForm(
     "moge",
     write_moge,
-    "MoGe-2: `.index.txt`, `<house>/<view>/` with `image.jpg`, `depth.png` (logarithmic, sky 65535), `normal.png`, `meta.json`",
+    "MoGe-2: `.index.txt`, `<house>/<view>/` with `image.jpg`, `depth.png`, `normal.png`, `meta.json`",
     lenses=("pinhole",),
-    convention=Convention(
-        0.5, axes="camera x right, y up, z backward", depth="logarithmic, along the axis"
-    ),
+    convention=Convention(0.5, axes="OpenGL's", depth="logarithmic, along the axis"),
 )

@@ -117,7 +117,7 @@ FORM = ViewForm(
     lenses=tuple(_MODELS),
     convention=Convention(
         0.5,
-        axes="camera x right, y up, z backward; world z up, m",
+        axes="OpenGL's; world z up, m",
         depth="mm, along the axis (of a fisheye or panorama along the ray)",
     ),
 )

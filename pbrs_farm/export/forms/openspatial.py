@@ -125,7 +125,5 @@ FORM = ViewForm(
     "OpenSpatial: `singleview.parquet`, `multiview.parquet` (a row a home), `image`, `depth_map`, `pose`, `intrinsic`, `masks`",
     has_classes=True,
     lenses=("pinhole",),
-    convention=Convention(
-        0, axes="camera x right, y down, z forward; world z up, m", depth="mm, along the axis"
-    ),
+    convention=Convention(0, axes="OpenCV's; world z up, m", depth="mm, along the axis"),
 )

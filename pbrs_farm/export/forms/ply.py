@@ -116,5 +116,5 @@ FORM = ViewForm(
     " yours) and `instance`; from the layer `position` if present, else from depth and K of"
     " a pin-hole",
     has_classes=True,
-    convention=Convention(None, axes="the home's world, y up, m"),
+    convention=Convention(None, axes="world y up, m"),
 )

@@ -74,13 +74,9 @@ def camera_line(view: ChosenView) -> str:
 FORM = ViewForm(
     "released",
     write_released,
-    "the published PBRS layout: `mlt_v2/<house>/<6 digits>_mlt.png`, `depth_v2`, `normal_v2`,"
-    " `category_v2`, `boundary_v2`, `opengl_ver2`, `camera_v2/<house>/room_camera.txt`,"
-    " `data_goodlist_v2.txt`",
+    "the published PBRS layout: `mlt_v2`, `opengl_ver2`, `depth_v2`, `normal_v2`, `category_v2`, `boundary_v2`, `camera_v2`, `data_goodlist_v2.txt`",
     lenses=("pinhole",),
     convention=Convention(
-        None,
-        axes="eye, towards, up in the home's world, y up, m; half angles",
-        depth="mm, along the axis",
+        None, axes="eye, towards, up; world y up, m; half angles", depth="mm, along the axis"
     ),
 )

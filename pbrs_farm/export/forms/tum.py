@@ -81,8 +81,6 @@ FORM = ViewForm(
     lenses=("pinhole", "radtan", "opencv"),
     is_of_frames=True,
     convention=Convention(
-        None,
-        axes="camera x right, y down, z forward; the home's world, y up, m",
-        depth="5000 steps a metre, along the axis",
+        None, axes="OpenCV's; world y up, m", depth="5000 steps a metre, along the axis"
     ),
 )

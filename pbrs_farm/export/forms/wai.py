@@ -159,13 +159,9 @@ def write_scene_lists(out: Path, splits: tuple[str, ...], _choice: Choice) -> No
 FORM = ViewForm(
     "wai",
     write_wai,
-    "MapAnything's WorldAI layout: `<house>/scene_meta.json`, `images`, `depth/*.exr`, `covisibility/v0/pairwise_covisibility--NxN.npy`"
-    " (share of each frame's picture that each other sees); with `--split` lists of scenes",
+    "MapAnything: `<house>/scene_meta.json`, `images`, `depth/*.exr`, `covisibility/v0` (the share of each frame's"
+    " picture that each other sees); with `--split` lists of scenes",
     finish=write_scene_lists,
     lenses=("pinhole",),
-    convention=Convention(
-        0,
-        axes="camera x right, y down, z forward; the home's world, y up, m",
-        depth="m, along the axis",
-    ),
+    convention=Convention(0, axes="OpenCV's; world y up, m", depth="m, along the axis"),
 )

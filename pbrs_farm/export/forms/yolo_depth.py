@@ -42,9 +42,7 @@ def write_depth_yaml(out: Path, splits: tuple[str, ...], _choice: Choice) -> Non
 FORM = ViewForm(
     "yolo-depth",
     write_yolo_depth,
-    "`images/<house>__<view>.png`, `depth/<house>__<view>.png` (uint16 mm, 0 = nothing or 65.535 m and"
-    " more; with `--layers depth_z` float32 metres in `.npy`), `data.yaml` as `yolo`'s, for"
-    " `yolo depth train data=data.yaml`",
+    "`images/<house>__<view>.png`, `depth/<house>__<view>.png` (uint16 mm; with `--layers depth_z` float32 metres in `.npy`), `data.yaml`",
     finish=write_depth_yaml,
     lenses=("pinhole", "radtan", "opencv"),
     convention=Convention(None, axes="", depth="mm (`depth_scale: 1000`), along the axis"),

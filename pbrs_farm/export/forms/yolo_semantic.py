@@ -45,9 +45,7 @@ def write_semantic_yaml(out: Path, splits: tuple[str, ...], choice: Choice) -> N
 FORM = ViewForm(
     "yolo-semantic",
     write_yolo_semantic,
-    "`images/<house>__<view>.png`, `masks/<house>__<view>.png` (uint8 class number: NYU40 id - 1; 255 ="
-    " nothing, or without a class), `data.yaml` as `yolo`'s with `masks_dir`, for"
-    " `yolo semantic train data=data.yaml`",
+    "`images/<house>__<view>.png`, `masks/<house>__<view>.png` (NYU40 id - 1; 255 = no class), `data.yaml` with `masks_dir`",
     has_classes=True,
     finish=write_semantic_yaml,
     convention=Convention(None, axes=""),
