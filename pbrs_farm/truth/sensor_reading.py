@@ -74,10 +74,6 @@ def hole_label(
 
     clear, mirror: (H, W) materials of the hits; reflectance: (H, W) 0..1 of infrared light. The light that returns is
     reflectance times the cosine of incidence over the squared distance.
-
-        >>> import numpy as np
-        >>> Hole(np.uint8(5)).name
-        'TOO_FAR'
     """
     _origin, rays = camera.exact_rays()
     length = np.linalg.norm(rays, axis=-1)
