@@ -7,20 +7,19 @@ from __future__ import annotations
 
 import hashlib
 import os
-from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from pbrs_farm.core.errors import MachineFailed
+from pbrs_farm.core.record import Record, read_csv
 
 DEFAULT_MIRROR: Final = "https://deb.debian.org/debian"
 _TIMEOUT_S: Final = 30.0  # of an answer
 _CHUNK: Final = 2**20
 
 
-@dataclass(frozen=True, slots=True)
-class Pin:
-    """One file of Debian's pool."""
+class Pin(Record):
+    """One file of Debian's pool: a row of pinned_packages.csv."""
 
     package: str
     path: str  # below the mirror
@@ -33,35 +32,7 @@ class Pin:
         return self.path.rpartition("/")[2]
 
 
-PINS: Final = {
-    pin.package: pin
-    for pin in (
-        Pin(
-            "sweethome3d",
-            "pool/main/s/sweethome3d/sweethome3d_7.0.2+dfsg-3_all.deb",
-            17004768,
-            "54bce4394ae763da1ffccff8f025565ce7161dc6934371e07480034ef155c411",
-        ),
-        Pin(
-            "sweethome3d-furniture",
-            "pool/main/s/sweethome3d-furniture/sweethome3d-furniture_1.8-1_all.deb",
-            119782356,
-            "3ccb90c63f9525e887a767b9cd5c8b6933b8b6b2973a615a5359ee68a2118668",
-        ),
-        Pin(
-            "blender-data",
-            "pool/main/b/blender/blender-data_3.4.1+dfsg-2_all.deb",
-            31389128,
-            "5ceaf56a49ba3ded95c751d739aeec3d19e7fad76fba5cb70666986af9303b0e",
-        ),
-        Pin(
-            "libatomic1",
-            "pool/main/g/gcc-12/libatomic1_12.2.0-14+deb12u1_amd64.deb",
-            9376,
-            "fbd4e154a6b444229ea002cc209df099209c0adc09102e5fd21239a3d2b55e2d",
-        ),
-    )
-}
+PINS: Final = {pin.package: pin for pin in read_csv(Path(__file__).with_suffix(".csv"), Pin)}
 
 
 def download_pinned(pin: Pin, folder: Path) -> Path:

@@ -4,47 +4,31 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from pbrs_farm.core.made_home import check_wishes
+from pbrs_farm.core.record import Record, read_csv
 from pbrs_farm.generate.floor_plan import RoomType
 from pbrs_farm.generate.plan_families import FLAT, PlanFamily, drawn_family, plan_families
 
-MEDIAN_AREA: Final = {
-    RoomType.LIVING: 27.2,
-    RoomType.KITCHEN: 9.7,
-    RoomType.BEDROOM: 10.9,
-    RoomType.OFFICE: 9.0,
-    RoomType.DINING: 12.0,
-    RoomType.STUDIO: 24.0,
-    RoomType.BATHROOM: 6.0,
-    RoomType.WC: 1.7,
-    RoomType.STORE: 2.2,
-    RoomType.WARDROBE: 3.4,
-}
+
+class _RoomAreas(Record):
+    type: RoomType
+    median: float | None = None  # None: what the other rooms leave
+    least: float
+    most: float
+    spread: float = 0.18
+
+
+_AREAS: Final = read_csv(Path(__file__).with_name("room_areas.csv"), _RoomAreas)
+MEDIAN_AREA: Final = {row.type: row.median for row in _AREAS if row.median is not None}
 """Square metres of floor."""
-
-AREA_RANGE: Final = {
-    RoomType.LIVING: (14.0, 45.0),
-    RoomType.KITCHEN: (7.2, 20.0),
-    RoomType.BEDROOM: (9.0, 17.0),
-    RoomType.OFFICE: (6.0, 17.0),
-    RoomType.DINING: (8.0, 20.0),
-    RoomType.STUDIO: (18.0, 34.0),
-    RoomType.BATHROOM: (3.8, 9.0),
-    RoomType.WC: (1.3, 2.4),
-    RoomType.STORE: (1.5, 4.0),
-    RoomType.WARDROBE: (2.5, 6.0),
-    RoomType.HALL: (3.0, 16.0),
-}
+AREA_RANGE: Final = {row.type: (row.least, row.most) for row in _AREAS}
 """Smallest and largest, square metres."""
-
-_SPREAD: Final = {
-    RoomType.BEDROOM: 0.16,
-    RoomType.LIVING: 0.20,
-}  # standard deviation of the logarithm of the area; 0.18 for other rooms
+_SPREAD: Final = {row.type: row.spread for row in _AREAS}
 _LIVING: Final = (RoomType.LIVING, RoomType.STUDIO)
 
 
@@ -189,7 +173,7 @@ def _draw_programme(rng: np.random.Generator, bedrooms: tuple[int, int], plans: 
 
 def drawn_area(rng: np.random.Generator, type_: RoomType, larger: float = 1.0) -> float:
     """Square metres of a room of that type by seed; larger: by so much than people's median."""
-    area = larger * MEDIAN_AREA[type_] * float(np.exp(rng.normal(0.0, _SPREAD.get(type_, 0.18))))
+    area = larger * MEDIAN_AREA[type_] * float(np.exp(rng.normal(0.0, _SPREAD[type_])))
     return float(np.clip(area, *AREA_RANGE[type_]))
 
 

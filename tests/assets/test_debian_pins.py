@@ -18,10 +18,10 @@ from pbrs_farm.core.errors import MachineFailed
 
 DATA = b"a Debian package" * 1000
 PIN = Pin(
-    "sweethome3d",
-    "pool/main/s/x/sweethome3d_1.0_all.deb",
-    len(DATA),
-    hashlib.sha256(DATA).hexdigest(),
+    package="sweethome3d",
+    path="pool/main/s/x/sweethome3d_1.0_all.deb",
+    n_bytes=len(DATA),
+    sha256=hashlib.sha256(DATA).hexdigest(),
 )
 
 

@@ -57,37 +57,7 @@ PERSON_WORD: Final = "person"
 PLANT_WORD: Final = "plant"
 _STAIRS: Final = "stairs"
 
-# Minimum and maximum of the longer horizontal side and of the height, in metres: items outside this
-# range are toys, trays, heaps or mistakes. A side of 0 is unbounded.
-_SIZES: Final[Mapping[str, tuple[float, float, float, float]]] = {
-    "bathtub": (0.7, 6, 0.1, 1.8),
-    "bed": (0.5, 5, 0.05, 3.2),
-    "books": (0, 2, 0, 2),
-    "bookshelf": (0.15, 10, 0.15, 4.5),
-    "cabinet": (0.1, 10, 0.08, 4.5),
-    "chair": (0.15, 2.8, 0.12, 2.2),
-    "counter": (0.2, 12, 0, 2.2),
-    "curtain": (0.1, 15, 0.15, 8),
-    "desk": (0.65, 5, 0.3, 2.5),
-    "door": (0.3, 8, 0.6, 6),
-    "dresser": (0.2, 4, 0.15, 2.6),
-    "floor mat": (0.2, 15, 0, 0.2),
-    "mirror": (0.02, 8, 0, 5),
-    "night stand": (0.15, 1.6, 0.15, 1.4),
-    "person": (0.1, 3, 0.2, 2.6),
-    "picture": (0.01, 10, 0, 6),
-    "pillow": (0.1, 2.5, 0.02, 1.2),
-    "refrigerator": (0.25, 3, 0.3, 2.8),
-    "sink": (0.08, 4, 0.03, 2.6),
-    "sofa": (0.5, 7, 0.15, 2),
-    "table": (0.15, 10, 0.12, 1.8),
-    "television": (0.12, 4, 0.1, 2.6),
-    "toilet": (0.15, 1.4, 0.1, 2),
-    "window": (0.1, 15, 0.1, 10),
-}
-# Floor furniture at the height of a table or shelf must have twice the minimum size: otherwise it
-# is
-# a doll's bed.
+# Floor furniture at the height of a table or shelf must have twice the minimum size: otherwise it is a doll's bed.
 _RAISED_M: Final = (0.6, 1.8)  # above the floor of the level
 _LEAST_LAWN_M: Final = 1.0  # minimum shorter side of a lawn, metres
 _FLATTEST_PLANT: Final = 0.1  # minimum height over shorter side; flatter plants cover the ground
@@ -163,6 +133,20 @@ class PieceClass:
 def _rows_of_csv(name: str) -> list[dict[str, str]]:
     text = files("pbrs_farm.read.common").joinpath(name).read_text("utf-8")
     return list(csv.DictReader(text.splitlines()))
+
+
+@cache
+def _sizes() -> Mapping[str, tuple[float, float, float, float]]:
+    """Class -> least and most of the longer horizontal side, then of the height, metres.
+
+    Items outside this range are toys, trays, heaps or mistakes. A side of 0 is unbounded.
+    """
+    sizes: dict[str, tuple[float, float, float, float]] = {}
+    for row in _rows_of_csv("class_sizes.csv"):
+        label, *sides = row.values()
+        least_side, most_side, least_height, most_height = map(float, sides)
+        sizes[label] = (least_side, most_side, least_height, most_height)
+    return sizes
 
 
 @cache
@@ -316,9 +300,9 @@ def stands_as_a_tree(width: float, height: float, depth: float) -> bool:
 def _fits_its_size(label: str, place: PieceSize | None) -> bool:
     if label == PLANT_WORD and place is not None:
         return not is_a_cover_of_ground(place.width, place.height, place.depth)
-    if place is None or label not in _SIZES:
+    if place is None or label not in _sizes():
         return True
-    long_min, long_max, height_min, height_max = _SIZES[label]
+    long_min, long_max, height_min, height_max = _sizes()[label]
     side = max(place.width, place.depth)
     if label in _STANDING and _RAISED_M[0] < place.bottom < _RAISED_M[1]:
         long_min *= 2
@@ -329,9 +313,9 @@ def _fits_its_size(label: str, place: PieceSize | None) -> bool:
 
 def is_far_too_large(label: str, place: PieceSize) -> bool:
     """True if an item exceeds twice the maximum size of its class, or a floor mat's height."""
-    if label not in _SIZES:
+    if label not in _sizes():
         return False
-    _, long_max, _, height_max = _SIZES[label]
+    _, long_max, _, height_max = _sizes()[label]
     slack = 1.0 if label == "floor mat" else _OFF_SCALE
     side = max(place.width, place.depth)
     return place.height > slack * height_max or side > _OFF_SCALE * long_max

@@ -27,48 +27,16 @@ _BESIDE_M: Final = 0.06  # fittings closer than this are one item, metres
 _MOST_PARTS: Final = 3_000  # in a mesh of more parts, neighbours are not searched
 
 # Words of names of materials, accents folded.
-_WINDOW_WORDS: Final = frozenset(
-    [
-        "window",
-        "fenster",
-        "fenetre",
-        "ventana",
-        "finestra",
-        "raam",
-        "fonster",
-        "vindu",
-        "glazing",
-        "sash",
-        "sill",
-        "mullion",
-        "louvre",
-        "louver",
-        "slat",
-        "slats",
-        "blind",
-        "blinds",
-        "shutter",
-        "jalousie",
-    ]
-)
+_WINDOWS: Final = """window fenster fenetre ventana finestra raam fonster vindu glazing sash sill mullion
+    louvre louver slat slats blind blinds shutter jalousie"""
+_WINDOW_WORDS: Final = frozenset(_WINDOWS.split())
 _FRAME_WORDS: Final = frozenset(
     ["frame", "frames", "trim", "casing", "rahmen", "cadre", "marco", "telaio", "kozijn"]
 )
 _DOOR_WORDS: Final = frozenset(["door", "doors", "tur", "porte", "puerta", "porta", "deur"])
-_SKIRTING_WORDS: Final = frozenset(
-    [
-        "skirting",
-        "baseboard",
-        "baseboards",
-        "sockelleiste",
-        "fussleiste",
-        "plinthe",
-        "rodapie",
-        "battiscopa",
-        "plint",
-        "listwa",
-    ]
-)
+_SKIRTINGS: Final = """skirting baseboard baseboards sockelleiste fussleiste plinthe rodapie battiscopa plint
+    listwa"""
+_SKIRTING_WORDS: Final = frozenset(_SKIRTINGS.split())
 
 
 def parted_fittings(item: Item, *, by_shape: bool) -> tuple[Item, tuple[Item, ...]]:

@@ -6,7 +6,7 @@ import hashlib
 import math
 import statistics
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import asdict, dataclass, field
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
@@ -332,7 +332,7 @@ def report(run: Trained, evaluations: list[Evaluation]) -> dict[str, Any]:
         "run": run.record,
         "trained": run.figures,
         "evaluations": [evaluation.as_json() for evaluation in evaluations],
-        "paper": asdict(paper) if paper else None,
+        "paper": paper.model_dump(exclude={"task"}, mode="json") if paper else None,
         "notes": notes(run, evaluations),
     }
     return {key: _without_nan(value) for key, value in row.items()}

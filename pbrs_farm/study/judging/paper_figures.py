@@ -6,8 +6,12 @@ pictures, other truth, 568,793 views and days of a GPU.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from itertools import groupby
+from operator import attrgetter
+from pathlib import Path
 from typing import Final
+
+from pbrs_farm.core.record import Record, Several, read_csv
 
 _PAPER_CLASSES: Final = 40  # of segmentation
 
@@ -20,42 +24,17 @@ _NAMES: Final = {
 }
 
 
-@dataclass(frozen=True, slots=True)
-class PaperRow:
-    """A row of the paper: its training sets, and its figures in the order of StudyTask.figures."""
+class PaperRow(Record):
+    """A row of paper_figures.csv: its training sets, and its figures in the order of StudyTask.figures."""
 
+    task: str
     pretrained: str
-    tuned: str
-    figures: tuple[float, ...]
+    tuned: str = ""
+    figures: Several[float]
 
 
-PAPER: Final[dict[str, tuple[PaperRow, ...]]] = {
-    # Mean, median, and shares below 11.25, 22.5, 30 degrees.
-    "normals": (
-        PaperRow("NYUv2 only", "", (27.30, 21.12, 0.2721, 0.5261, 0.6472)),
-        PaperRow("MLT object", "", (48.78, 47.49, 0.0356, 0.1279, 0.2135)),
-        PaperRow("MLT-OL", "", (49.33, 42.30, 0.0747, 0.2324, 0.3409)),
-        PaperRow("MLT-IL/OL", "", (27.90, 21.29, 0.2676, 0.5221, 0.6375)),
-        PaperRow("OpenGL-DL", "", (34.02, 28.00, 0.1856, 0.4114, 0.5290)),
-        PaperRow("OpenGL-IL", "", (33.06, 26.68, 0.2089, 0.4346, 0.5466)),
-        PaperRow("OpenGL-IL", "NYUv2", (23.38, 16.12, 0.3598, 0.6293, 0.7317)),
-        PaperRow("MLT-IL/OL", "NYUv2", (21.74, 14.75, 0.3937, 0.6625, 0.7606)),
-    ),
-    # The paper reports mean IoU only.
-    "segmentation": (
-        PaperRow("ImageNet (Yu et al.)", "NYUv2", (0.317,)),
-        PaperRow("ImageNet + OpenGL", "NYUv2", (0.328,)),
-        PaperRow("ImageNet + MLT", "NYUv2", (0.332,)),
-    ),
-    # ODS, OIS, AP, R50; the R50 of the first row cannot go with its ODS and AP.
-    "boundaries": (
-        PaperRow("NYUv2 only", "", (0.713, 0.725, 0.711, 0.267)),
-        PaperRow("OpenGL-IL", "", (0.523, 0.555, 0.511, 0.504)),
-        PaperRow("MLT-IL/OL", "", (0.604, 0.621, 0.587, 0.749)),
-        PaperRow("OpenGL-IL", "NYUv2", (0.716, 0.729, 0.715, 0.893)),
-        PaperRow("MLT-IL/OL", "NYUv2", (0.725, 0.736, 0.720, 0.887)),
-    ),
-}
+_ROWS: Final = read_csv(Path(__file__).with_suffix(".csv"), PaperRow)
+PAPER: Final = {task: tuple(rows) for task, rows in groupby(_ROWS, attrgetter("task"))}
 
 
 def paper_row(task: str, mode: str, n_classes: int = _PAPER_CLASSES) -> PaperRow | None:
