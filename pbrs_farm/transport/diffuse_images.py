@@ -58,11 +58,7 @@ def add_diffuse_images(
 def shading_by_group(
     aovs: LinearAovs, diffuse: Mapping[str, F32], *, denoise: bool, wraps: bool = False
 ) -> dict[Group, RadianceImage]:
-    """Light group -> (H, W, 3) float32 irradiance over pi, 0 where no first surface scatters light.
-
-    aovs: of the same view, whose guides count; diffuse: the images of this module. denoise, wraps:
-    as of `develop`.
-    """
+    """Light group -> (H, W, 3) float32 irradiance over pi, 0 where no first surface scatters light."""
     albedo = diffuse[ALBEDO]
     shading = {
         group: np.divide(diffuse[name], albedo, out=np.zeros_like(albedo), where=albedo > 0)
@@ -80,10 +76,7 @@ def shading_by_group(
 def intrinsic_parts(
     radiance: RadianceImage, albedo: F32, shading: RadianceImage
 ) -> tuple[NDArray[np.float16], NDArray[np.float16]]:
-    """(shading, residual) in half floats: albedo x shading + residual is radiance to half a step.
-
-    albedo: (H, W, 3) linear, of the label. The residual may be negative.
-    """
+    """(shading, residual) in half floats: albedo x shading + residual is radiance to half a step; residual may be < 0."""
     stored = np.clip(shading, 0, _MOST_HALF).astype(np.float16)
     residual = radiance - albedo * stored.astype(np.float32)
     return stored, np.asarray(np.clip(residual, -_MOST_HALF, _MOST_HALF), np.float16)

@@ -43,10 +43,7 @@ _MAX_ATTEMPTS: Final = 200  # attempts to find a point in a polygon that is thin
 def illuminance_record(
     house: House, lux: dict[str, dict[str, float]], *, is_day: bool = True
 ) -> dict[str, Any]:
-    """The record illuminance.json: a row per room, with a warning for implausible values.
-
-    lux: from LightScene.floor_lux; rooms without an entry are skipped. is_day: as of photometric_warnings.
-    """
+    """illuminance.json: a row per room in lux (of LightScene.floor_lux), with warnings for implausible values."""
     rows = [
         {
             "room": room.id,
@@ -63,11 +60,7 @@ def illuminance_record(
 
 
 def photometric_warnings(room: Room, lux: dict[str, float], *, is_day: bool = True) -> list[str]:
-    """A line for each light group whose illuminance of the room's floor is out of range.
-
-    lux: of "outdoor" and "indoor". A group that room.lit_by lacks has no lower bound, nor has
-    daylight without the sun above the horizon.
-    """
+    """A line for each light group ("outdoor", "indoor") whose illuminance of the floor is out of range."""
     lines = []
     has_lamps = not {"lamps", "fallback", "added"}.isdisjoint(room.lit_by)
     has_daylight = is_day and not {"windows", "sky"}.isdisjoint(room.lit_by)
@@ -84,10 +77,7 @@ def photometric_warnings(room: Room, lux: dict[str, float], *, is_day: bool = Tr
 
 
 def darkness_of_room(room: Room, lux: dict[str, float]) -> str:
-    """Warning if all light together leaves the room's floor darker than DARK_LX, else "".
-
-    lux: light group -> mean illuminance on the floor, lx.
-    """
+    """Warning if all light (group -> mean lx of the floor) leaves it darker than DARK_LX, else ""."""
     total = sum(lux.values())
     if total >= DARK_LX:
         return ""
@@ -95,11 +85,7 @@ def darkness_of_room(room: Room, lux: dict[str, float]) -> str:
 
 
 def floor_points(room: Room, n: int, seed: int) -> F64:
-    """(n, 3) points uniform over a room's floor polygon, 5 cm above it.
-
-    n: more than 0; the same seed gives the same points. Furniture is not regarded, so points may
-    lie inside a cupboard. A polygon too thin to be hit gets its middle over and over.
-    """
+    """(n, 3) points uniform over a room's floor polygon by seed, 5 cm above it, furniture disregarded."""
     # Draw points in the polygon's box and keep those inside, until there are enough.
     rng = np.random.default_rng(seed)
     low, high = room.polygon.min(0), room.polygon.max(0)
@@ -117,10 +103,7 @@ def floor_points(room: Room, n: int, seed: int) -> F64:
 def illuminance_lx(
     scene: DeviceScene, emitters: Emitters, points: F64, seed: int
 ) -> tuple[float, float]:
-    """(outdoor, indoor) mean illuminance in lx of level surfaces at points (N, 3), facing up.
-
-    Monte Carlo with few samples a point, for the mean over many points; repeatable by the seed.
-    """
+    """(outdoor, indoor) mean lx of level surfaces at points (N, 3), facing up; few samples a point, by seed."""
     up = np.tile([0.0, 1.0, 0.0], (len(points), 1))
     # A white matte surface reflects E / pi: times pi and lm/W it is illuminance.
     radiance = radiosity(scene, emitters, points, up, _SPP, seed)
@@ -139,10 +122,8 @@ def radiosity(
     lamps: I64 | None = None,
     max_depth: int | None = None,
 ) -> tuple[F64, F64]:
-    """(outdoor, indoor) radiance that white matte surfaces reflect: irradiance / pi, (N, 3) each.
-
-    points, normals: (N, 3). lamps: (N,) the one lamp that counts for each, nothing outdoors then.
-    max_depth: vertices of a path, the recipe's usual number unless given.
+    """(outdoor, indoor) irradiance
+    pi, (N, 3) each; lamps: (N,) the one that counts, nothing outdoors then.
     """
     # Let one lamp through for each point when lamps are given, all emitters otherwise.
     n = len(points)

@@ -23,10 +23,7 @@ MAX_SUMS: Final = 2**32  # pixels x lamps x 3 of one launch: the kernel counts t
 def add_lamp_layers(
     result: LightResult, sums: F32 | None, spp: int, lamps: Sequence[AreaEmitter]
 ) -> LightResult:
-    """The result with a layer for each lamp that lights the view, and indoor their sum to the bit.
-
-    sums: (H * W, L, 3) over spp samples, None in a house without lamps.
-    """
+    """The result with a layer for each lamp that lights the view, of sums (H * W, L, 3) over spp samples."""
     shape = result.indoor.shape
     # Divide each lamp's sums by the samples; leave out lamps without any light.
     by_lamp = [] if sums is None else [sums[:, k] for k in range(sums.shape[1])]
@@ -44,10 +41,7 @@ def add_lamp_layers(
 def indoor_from_lamps(
     layers: Mapping[int, RadianceImage], factors: Mapping[int, F32], shape: tuple[int, ...]
 ) -> RadianceImage:
-    """Sum of the lamps' layers in the order of their numbers, each times its factor.
-
-    factors: number -> (3,) of R, G and B; 1 if missing. shape: (H, W, 3).
-    """
+    """Sum of the lamps' layers (H, W, 3) in the order of their numbers, each times its factor (3,), or 1."""
     total = np.zeros(shape, np.float32)
     for number in sorted(layers):
         factor = factors.get(number)
@@ -75,10 +69,7 @@ def relit_indoor(
 def lamp_shares(
     indoor: RadianceImage, layers: Mapping[int, RadianceImage]
 ) -> dict[int, RadianceImage]:
-    """Number -> the lamp's part of denoised indoor light (H, W, 3), so that relit_indoor is a sum of them.
-
-    layers: number -> the lamp's own noisy light. They divide each pixel; black ones in equal parts.
-    """
+    """Number -> the lamp's part of denoised indoor light, by its noisy layers: relit_indoor is their sum."""
     total = indoor_from_lamps(layers, {}, indoor.shape)
     equal = np.float32(1 / max(1, len(layers)))
     return {

@@ -44,10 +44,7 @@ class LightResult:
         return self.outdoor if group is Group.OUTDOOR else self.indoor
 
     def mode(self, mode: Mode) -> RadianceImage:
-        """The sum of the groups that make a lighting mode; ValueError for an OpenGL mode.
-
-        A new array where the mode has two groups, else the group's own: do not write into it.
-        """
+        """The sum of a mode's groups, not to be written into; ValueError for an OpenGL mode."""
         groups = GROUPS_OF_MODE[mode]
         if not groups:
             raise ValueError(f"{mode} is not a sum of light groups")
@@ -58,11 +55,7 @@ class LightResult:
 
 
 def blacken(result: LightResult, mask: Mask) -> LightResult:
-    """The result with every image 0 where the mask (H, W) is.
-
-    mask: bool. For pixels that a fisheye lens does not see. Views of the old arrays are not written
-    to.
-    """
+    """A copy of the result with every image 0 where the mask (H, W) is: pixels that a lens does not see."""
 
     def cleared(image: F32) -> F32:
         return np.where(mask[..., None], np.float32(0), image)
@@ -79,10 +72,7 @@ def blacken(result: LightResult, mask: Mask) -> LightResult:
 
 
 def darkness_of_picture(result: LightResult) -> str:
-    """A line when the sum of all light leaves nine tenths of the picture black, else "".
-
-    Judges tiles by their mean, so that neither single fireflies nor noise decide.
-    """
+    """A line when all light leaves nine tenths of the picture black, by tiles' means, else ""."""
     level = (result.outdoor + result.indoor) @ LUMINANCE * np.float32(LM_PER_W)
     is_hit = np.any(result.normal != 0, -1) | (level > 0)
     tiles = [

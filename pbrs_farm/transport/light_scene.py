@@ -323,10 +323,7 @@ class LightScene:
         return join_results(base, direct, halves, n_bad, facts)
 
     def floor_lux(self, house: House, *, seed: int = 0) -> dict[str, dict[str, float]]:
-        """Room id -> mean illuminance of its floor in lx by "outdoor" and "indoor" light.
-
-        256 points 5 cm above the floor, 32 paths each, furniture in place. {} for scalar variants.
-        """
+        """Room id -> mean lx of its floor by "outdoor" and "indoor" light, furniture in place; {} if scalar."""
         if self.variant.startswith("scalar"):
             return {}
         mitsuba(self.variant)

@@ -29,10 +29,7 @@ class RenderCheckpoint(Protocol):
         ...
 
     def keep(self, part: str, share: float, state: Callable[[], Arrays]) -> None:
-        """A launch has ended: share (0..1) of the whole render is done.
-
-        state: gives the part's arrays, which may be asked for now or when a later part calls.
-        """
+        """A launch has ended, share (0..1) of the render is done; state: gives the part's arrays, now or later."""
         ...
 
 

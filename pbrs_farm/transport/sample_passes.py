@@ -49,11 +49,7 @@ class SampledView:
 def path_sums(
     view: SampledView, checkpoint: RenderCheckpoint, *, n_lamps: int = 0
 ) -> tuple[SampleSums, int]:
-    """(sums, samples per pixel) in passes of fields.spp until fields.noise is reached.
-
-    With a time budget: launches that fit into its remainder, at least one. n_lamps: 0, or the number of all
-    lamps, to sum the light of each separately.
-    """
+    """(sums, samples per pixel) in passes of fields.spp up to the noise or time; n_lamps: to sum apart."""
     # Size the launches: by memory, by the pace so far, and one pass each when noise decides.
     camera, fields = view.camera, view.fields
     per_launch = samples_per_launch(camera.intrinsics.width_px * camera.intrinsics.height_px)
@@ -85,11 +81,7 @@ def _noise_left(total: SampleSums | None, spp: int, view: SampledView) -> float:
 def direct_sums(
     view: SampledView, checkpoint: RenderCheckpoint, *, share: float = 1.0
 ) -> SampleSums:
-    """Sums over fields.direct_spp samples of light that meets one surface.
-
-    Without any such samples: over one sample of no light, for the denoiser's guides. share: of the
-    whole render.
-    """
+    """Sums over fields.direct_spp samples of light that meets one surface; without any, one unlit, for guides."""
     # Depth counts a path's segments, the camera's among them: 2 is light that met one surface.
     n_samples, max_depth = (view.fields.direct_spp, 2) if view.fields.direct_spp > 0 else (1, 1)
     i = view.camera.intrinsics

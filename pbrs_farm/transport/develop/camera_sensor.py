@@ -62,13 +62,7 @@ class Exposure:
 
 
 def choose_exposure(target: float, fields: SensorFields) -> Exposure:
-    """The exposure nearest to a wanted factor that shutter and ISO allow: the shutter opens first.
-
-    target: factor from radiance to the picture's scale, before the compensation of
-    `fields.compensation_ev`. The shutter opens up to its longest first, then ISO rises; where both
-    are at their ends the picture comes out darker or brighter than wanted. A fixed shutter
-    (shutter_s > 0) leaves ISO alone to follow.
-    """
+    """The exposure nearest to target (radiance to the picture's scale): the shutter opens first, then ISO rises."""
     goal = target * 2**fields.compensation_ev
     # Factor on radiance of one second at ISO 1.
     unit = LM_PER_W * math.pi / 4 / fields.f_number**2 / _SATURATION_LX_S * fields.headroom
@@ -103,11 +97,7 @@ class SensorShot:
     times_s: tuple[float, ...] = ()  # of those frames; this one's is 0
 
     def exposure(self, mode: str, target: float) -> Exposure:
-        """Exposure of a mode's picture, from the mode's own target factor.
-
-        target: the factor that tone mapping would use for the picture. Previous frames pull it along by
-        `fields.lag_s`, since automatic exposure lags; KeyError for a mode that the previous frames lack.
-        """
+        """Exposure of a mode from its own target, pulled along by previous frames; KeyError if they lack the mode."""
         path = [frame[mode] for frame in self.before]
         lagged = lag_exposure([*path, target], [*self.times_s, 0.0], self.fields.lag_s)
         return choose_exposure(lagged, self.fields)
@@ -122,11 +112,7 @@ def take_by_sensor(
     *,
     seed: int,
 ) -> Srgb8Image:
-    """(H, W, 3) uint8 sRGB as the sensor takes radiance (H, W, 3); gains (3,): its white balance.
-
-    fields: flare, contrast and sharpening of its response, whose white is where the sensor
-    saturates. Equal seeds give equal bits.
-    """
+    """(H, W, 3) uint8 sRGB as the sensor takes radiance (H, W, 3); gains (3,): its white balance."""
     rng = np.random.default_rng(seed)
     # Saturation is white in all channels after the gains: scale them to 1 at least.
     scaled = gains.astype(np.float64) / float(gains.min())
@@ -204,10 +190,7 @@ def demosaic(raw: F64) -> F64:
 
 
 def electrons_read(light: F64, iso: float, sensor: SensorFields, rng: np.random.Generator) -> F64:
-    """Sensor values of light (1 = the tone's white): shot noise, read noise, saturation, quantization.
-
-    Noise may make dark values negative.
-    """
+    """Sensor values of light (1 = the tone's white): shot noise, read noise, saturation, steps; may be below 0."""
     # The amplifier reaches its end with fewer electrons as ISO rises.
     well = sensor.full_well_e * sensor.iso_min / iso
     electrons = rng.poisson(np.clip(light / sensor.headroom * well, 0, 1e9)).astype(np.float64)

@@ -23,11 +23,7 @@ _WRAPPED_PX: Final = 64  # beyond a panorama's edges, more than a denoiser looks
 
 @dataclass(frozen=True, slots=True, eq=False)
 class LinearAovs:
-    """The linear AOVs of radiance.exr, (H, W, 3) float32 each: what `develop` makes pictures of.
-
-    albedo and normal are means over the pixel, filtered as the radiance is, and guide the
-    denoiser.
-    """
+    """The linear AOVs of radiance.exr, (H, W, 3) float32; albedo and normal guide the denoiser."""
 
     outdoor: RadianceImage  # raw radiance of each light group, W m-2 sr-1
     indoor: RadianceImage
@@ -99,10 +95,7 @@ def wanted_exposures(
 
 
 def denoise_aovs(aovs: LinearAovs, *, wraps: bool = False) -> LinearAovs:
-    """Denoise each light group separately; pixels without a hit stay black.
-
-    wraps: the left edge adjoins the right one, as in a panorama, and must show no seam.
-    """
+    """Denoise each light group; pixels without a hit stay black. wraps: a panorama, whose edges adjoin."""
     if wraps:
         # Extend the picture by the other edge on both sides.
         n = min(_WRAPPED_PX, aovs.outdoor.shape[1])

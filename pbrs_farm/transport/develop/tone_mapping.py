@@ -113,11 +113,7 @@ def add_veil(light: F64, fields: ToneFields) -> F64:
 
 
 def flatten_light(light: F64, fields: ToneFields) -> F64:
-    """Exposed light (H, W, 3) with large differences of luminance reduced, without halos.
-
-    A guided filter (He, Sun, Tang 2013) of the logarithm of luminance gives the base; `local_contrast` of its
-    distance to the key is taken out.
-    """
+    """Exposed light (H, W, 3) with less contrast between regions, by a guided filter (He, Sun, Tang 2013)."""
     if fields.local_contrast == 0:
         return light
     stops = np.log2(np.maximum(light @ LUMINANCE, _LOCAL_FLOOR))
@@ -153,10 +149,7 @@ def _reinhard(rgb: F64, key: float, exposure: float | None) -> F64:
 
 
 def roll_off(rgb: F64, white: float) -> F64:
-    """The curve of `photo`: straight up to the shoulder, then a logarithm that reaches 1 at white.
-
-    It maps the largest component and keeps the hue; above a luminance of 1 colours turn pale.
-    """
+    """The curve of `photo`: straight up to the shoulder, then a logarithm to 1 at white; keeps the hue up to 1."""
     # Skip pixels on the linear part of the curve, which are most of a picture.
     top = np.maximum(np.maximum(rgb[..., 0], rgb[..., 1]), rgb[..., 2])
     is_soft = top > _SHOULDER
@@ -188,11 +181,7 @@ def knee_of(white: float) -> float:
 
 
 def add_glare(radiance: RadianceImage, share: float) -> RadianceImage:
-    """Radiance (H, W, 3) with a share of each pixel's light spread wide about it, as in lens and eye.
-
-    A third each by Gaussians of 1, 4 and 16 % of the picture's width; light is neither lost nor
-    made but at the edges, beyond which the picture goes on as its border.
-    """
+    """Radiance with a share of each pixel's light spread by Gaussians of 1, 4 and 16 % of the picture's width."""
     if share <= 0:
         return radiance
     light = np.nan_to_num(np.asarray(radiance, np.float32), posinf=0.0)

@@ -38,10 +38,7 @@ class ArrivalCounts(NamedTuple):
     arrived: Any  # those that met nothing on their way
 
     def numpy(self) -> NDArray[np.uint32]:
-        """(2, voxels, N_KINDS) uint32; row 0 counts cast rays, row 1 unoccluded ones.
-
-        Waits for the counting kernel.
-        """
+        """(2, voxels, N_KINDS) uint32; row 0 counts cast rays, row 1 unoccluded ones; waits for the kernel."""
         return np.stack([x.numpy().reshape(-1, N_KINDS) for x in self])
 
 

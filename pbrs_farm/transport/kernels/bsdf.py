@@ -27,11 +27,7 @@ _LEAST_WALL_COS = 0.1  # a round wall is met no flatter over its whole thickness
 
 
 class Bsdf(NamedTuple):
-    """The parameters of the reflectance model at a point, lane by lane.
-
-    A diffuse base, diffuse transmission and a GGX coat above (Ashikhmin and Shirley's
-    coupling keeps energy).
-    """
+    """The reflectance model at a point, lane by lane: diffuse base and transmission, a GGX coat above."""
 
     kd: Any  # Color3f, diffuse reflectance
     f0: Any  # Color3f, the coat's reflectance at normal incidence; of a mirror its reflectance
@@ -75,10 +71,7 @@ def evaluate_bsdf(bsdf: Bsdf, wi: Any, wo: Any, *, least_diffuse: float = 0.0) -
 
 
 def diffuse_reflection(bsdf: Bsdf, cos_o: Any) -> Any:
-    """f |cos wo| of diffuse reflection alone, less diffuse_response() to wi; cos_o > 0, both are above.
-
-    Under a coat it is Ashikhmin and Shirley's diffuse term (2000), reciprocal with the other response.
-    """
+    """f |cos wo| of diffuse reflection alone, less diffuse_response() to wi; cos_o > 0, both are above."""
     coated = 28 / 23 * (1 - bsdf.f0) * _ashikhmin(cos_o)
     return bsdf.kd * dr.select(bsdf.alpha > 0, coated, 1.0) * (cos_o * dr.inv_pi)
 
@@ -89,10 +82,7 @@ def diffuse_response(has_coat: Any, cos_i: Any) -> Any:
 
 
 def white_share(value: Any, wo: Any) -> Any:
-    """Color3f of f |cos wo| of a white matte surface over value, that of a surface (`evaluate_bsdf`); 0 below.
-
-    Where value is 0 in a channel it is 0 there, too.
-    """
+    """Color3f of f |cos wo| of a white matte surface over value (of `evaluate_bsdf`); 0 below and where value is 0."""
     return dr.select((wo.z > 0) & (value > 0), wo.z * dr.inv_pi / value, 0)
 
 
@@ -111,10 +101,7 @@ def sample_bsdf(bsdf: Bsdf, wi: Any, u_lobe: Any, uv: Any, *, least_diffuse: flo
 
 
 def coat_reflection(f0: Any, alpha: Any, wi: Any, wo: Any) -> Any:
-    """f |cos wo| of the coat alone; local directions, both above. f0: Color3f; alpha > 0: GGX roughness.
-
-    Trowbridge-Reitz with height-correlated masking; Schlick's Fresnel.
-    """
+    """f |cos wo| of the coat alone (GGX, Schlick); local directions, both above. f0: Color3f; alpha > 0."""
     h = dr.normalize(wi + wo)
     fresnel = _schlick(f0, dr.maximum(dr.dot(wi, h), 0))
     shadowed = 1 + _lambda(wi, alpha) + _lambda(wo, alpha)
@@ -137,10 +124,7 @@ def view_independent_pdf(bsdf: Bsdf, ng: Any, w: Any) -> Any:
 
 
 def thin_glass_reflectance(cos_i: Any) -> Any:
-    """Share that a thin clear pane of index 1.5 reflects, all inner reflections counted.
-
-    cos_i: either sign. Nothing is absorbed: the rest goes through.
-    """
+    """Share that a thin clear pane of index 1.5 reflects, all inner reflections counted; cos_i of either sign."""
     fresnel: Any = mi.fresnel
     r = fresnel(dr.abs(cos_i), mi.Float(1.5))[0]
     return 2 * r / (1 + r)

@@ -119,11 +119,7 @@ def ray_table(i: Intrinsics) -> F32:
 def camera_ray(
     camera: DeviceCamera | LensCamera, corner: Any, offset: Any, sampler: Sampler | None
 ) -> tuple[Any, Any]:
-    """(origin, unit direction) through a place of the film: a pixel's corner plus an offset, px.
-
-    sampler: draws the place in the pupil and the time; None: the pupil's middle, the middle of the
-    time for which the row is open.
-    """
+    """(origin, unit direction) at a pixel's corner plus an offset, px; sampler draws pupil and time, None: the middle."""
     if isinstance(camera, DeviceCamera):
         x, y = corner.x + offset.x, corner.y + offset.y
         return mi.Point3f(camera.eye), dr.normalize(camera.d0 + x * camera.du + y * camera.dv)

@@ -56,10 +56,7 @@ _MAP_PACKET = FIRST_MAP_TEXEL // 4  # the last one, of the maps
 
 
 class SurfaceInteraction(NamedTuple):
-    """The first surface along each ray, lane by lane; fields are valid where `valid` is.
-
-    Both normals point to the side that the ray comes from.
-    """
+    """The first surface along each ray where `valid`; both normals point to the side that the ray comes from."""
 
     valid: Any  # Bool: the ray meets a surface
     p: Any  # Point3f
@@ -128,10 +125,7 @@ class DeviceScene:
         self._max_albedo = dr.opaque(mi.Float, tables.max_albedo)
 
     def move(self, positions: F32, faces: NDArray[np.uint32], rows: F32) -> None:
-        """Move vertices: all positions (V, 3), and the new rows (N, FACE_FLOATS) of the moving faces (N,).
-
-        Guiding's entries in the rows are kept. Acceleration structures are rebuilt. Emitters must not move.
-        """
+        """Move vertices: all positions (V, 3), new rows of the moving faces (N,); emitters must not move."""
         scenes = {id(s): s for s in (self._all, self.fast, self._opaque, self._transparent)}
         for scene in scenes.values():
             if scene is not None:
@@ -190,10 +184,7 @@ class DeviceScene:
 
     @dr.syntax
     def intersect_past_holes(self, o: Any, d: Any, active: Any) -> SurfaceInteraction:
-        """The first surface along a ray that is not cut out; after MAX_SHEETS any surface counts.
-
-        For rays that need one answer: paths continue behind holes themselves.
-        """
+        """The first surface along a ray that is not cut out; after MAX_SHEETS any surface counts."""
         start = mi.Point3f(o)
         if dr.hint(self._has_holes, mode="scalar"):
             looks, n = mi.Bool(active), mi.UInt32(0)
@@ -258,11 +249,7 @@ class DeviceScene:
         return dr.select(n >= MAX_TRANSPARENT, 0, share)
 
     def sample_face(self, face: Any, u: Any, active: Any) -> tuple[Any, Any]:
-        """(point, unit normal) uniform over a face.
-
-        face: UInt32; u: Point2f in [0, 1)^2. The normal is the geometric one, by the order of the
-        corners; the pdf is 1 / area. Values of lanes that are not active mean nothing.
-        """
+        """(point, unit geometric normal) uniform over a face (UInt32), u: Point2f; undefined in inactive lanes."""
         bary = mi.warp.square_to_uniform_triangle(u)
         v0, e1, e2 = (self._packet(face, k, active) for k in range(3))
         a, b = vector(e1), vector(e2)
@@ -356,10 +343,7 @@ class DeviceScene:
 
 
 class Panes:
-    """The glass of windows, which only rays meet that nothing has scattered.
-
-    Light goes through as if it were not there: it would cost each shadow ray a test.
-    """
+    """The glass of windows, which only rays meet that nothing has scattered: each shadow ray would pay a test."""
 
     def __init__(self, tables: SceneTables) -> None:
         """tables: of the panes alone (`panes_of_house`)."""
@@ -423,11 +407,7 @@ def bend_normal(n: Any, d: Any) -> Any:
 
 
 def offset_ray_origin(p: Any, n: Any) -> Any:
-    """p (Point3f) moved off its surface along n (unit), so that a ray from there does not meet it again.
-
-    n: towards the side that the ray goes to. The step grows with the coordinates, as
-    float32's spacing does.
-    """
+    """p moved off its surface along n (unit, the ray's side) by a step that grows as float32's spacing does."""
     return mi.Point3f(p + n * _ray_step(p))
 
 

@@ -58,10 +58,7 @@ def sample_direct_light(
     active: Any,
     path: PathState | None = None,
 ) -> DirectLight:
-    """The light scattered back along the path by a shadow ray each to sky, lamps and sunlit points.
-
-    path: the one that has come to the vertex, needed where sunlit points are sampled.
-    """
+    """Light scattered back along the path (to the vertex) by a shadow ray each to sky, lamps and sunlit points."""
     emitters, emitter_filter, dim = context.emitters, context.emitter_filter, vertex.dim
     p, outdoor, indoor, sunlit = vertex.si.p, None, None, None
     if emitter_filter.outdoor is not None:
@@ -103,10 +100,7 @@ def _direct_light(
     roulette: ShadowRoulette | None,
     path: PathState | None = None,
 ) -> DirectLightSample:
-    """Contribution of one shadow ray; zero if its roulette casts none.
-
-    path: the path up to the vertex, if sunlit points take over a part of the sun.
-    """
+    """Contribution of one shadow ray; zero if its roulette casts none. path: where sunlit points take over."""
     if sample is None:
         none = mi.Color3f(0)
         return DirectLightSample(none, mi.Vector3f(0, 1, 0), mi.Color3f(0), white=none)

@@ -114,10 +114,7 @@ class Emitters:
         self._has_group = {Group.OUTDOOR: shines, Group.INDOOR: len(tables.lamps) > 0}
 
     def has_group(self, group: Group) -> bool:
-        """Whether anything of a group shines at all.
-
-        A group that never shines need not be traced: its picture is black.
-        """
+        """Whether anything of a group shines: else its picture is black and need not be traced."""
         return self._has_group[group]
 
     def set_outside(self, outside: Outside, dome: F32) -> None:
@@ -131,20 +128,12 @@ class Emitters:
         self._set_dome(dome, outside.sky.dome)
 
     def set_view(self, portals: F64, weights: EmitterWeights) -> None:
-        """Set the portals and weights of another view; lamps and sky stay.
-
-        Cheap: nothing is compiled anew. portals: (N, 4, 3) corners of rectangles, metres, at most
-        MAX_PORTALS.
-        """
+        """Set another view's portals (N, 4, 3), metres, at most MAX_PORTALS, and weights; nothing is compiled anew."""
         self._set_portals(portals)
         self.set_weights(weights)
 
     def set_weights(self, weights: EmitterWeights) -> None:
-        """Set other weights; the scene stays.
-
-        For the second and later passes of a view, when counts of the first say where light comes
-        from. Chances alone change, never what a picture converges to.
-        """
+        """Set other weights for later passes of a view; what a picture converges to stays."""
         self._set_lamp_weights(weights.lamps, weights.arrival_rates)
         self._set_outdoor_weights(weights)
         self.nearby.set_guided(weights.is_guided)
@@ -152,18 +141,12 @@ class Emitters:
         self._set_shadow_thresholds(weights)
 
     def set_targets(self, targets: GuidingTargets) -> None:
-        """Set what guided rays aim at.
-
-        `no_targets` takes them away again.
-        """
+        """Set what guided rays aim at; `no_targets` takes them away again."""
         self.targets = TargetSampler(targets)
         self.nearby.set_targets(targets)
 
     def near_lamps(self, p: Any, n: Any, counted: Any, active: Any) -> NearbyLamps:
-        """The strongest lamps at p on a surface with normal n.
-
-        p: Point3f; n: unit Vector3f. counted: the only technique to count, -1 for all.
-        """
+        """The strongest lamps at p on a surface with normal n; counted: the only technique to count, -1 for all."""
         rates = self.arrival.of_near_lamps(p, active)
         rates[0] = dr.select(counted >= 0, 1, rates[0])
         return self.nearby.at_vertex(p, n, counted, rates, active)
@@ -282,10 +265,7 @@ class Emitters:
     def eval_dome(
         self, chances: list[Any], p: Any, d: Any, counted: Any, active: Any, is_seen: Any = False
     ) -> tuple[Any, Any]:
-        """(radiance of the dome in direction d, pdf of sampling d from p, excluding the sun).
-
-        is_seen: Bool, the ray sees the sky itself, not the light of all surroundings.
-        """
+        """(the dome's radiance in direction d, pdf from p, without the sun); is_seen: the sky itself is seen."""
         first = 0 if is_seen is False else dr.select(is_seen, self._first_seen, 0)
         radiance, texel_pdf = self._dome_row(d, active, first)
         free = counted < 0

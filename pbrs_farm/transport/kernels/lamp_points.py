@@ -65,8 +65,5 @@ class LampPointSampler:
 
 
 def padded(kind: Any, rows: NDArray[Any], last: NDArray[Any]) -> Any:
-    """Rows and one more on the device, so that a house without lamps has a row, too.
-
-    rows: (N, ...), last: (1, ...) of the same shape behind. Flattened; index with row * width.
-    """
+    """Rows (N, ...) and a last one on the device, flattened: a house without lamps has a row, too."""
     return device_array(kind, np.concatenate([rows, last]).ravel())

@@ -75,10 +75,7 @@ class OutdoorChoice:
     def count(
         self, counts: TechniqueCounts, p: Any, technique: Any, active: Any, brought: Any
     ) -> None:
-        """Count vertices at p, and the luminance contributed to the path there.
-
-        technique: the only one sampled, or negative.
-        """
+        """Count vertices at p and the luminance that the only technique sampled (< 0: none) brought there."""
         counted = active & (technique >= 0)
         place = self.grid.voxel(p) * MAX_TECHNIQUES + mi.UInt32(dr.maximum(technique, 0))
         # Add in place: a copy per thread would put the number of voxels into the kernel, and every
@@ -99,10 +96,7 @@ def choose_technique(chances: list[Any], u: Any) -> tuple[Any, Any]:
 
 
 def weights_by_place(weights: F64, counts: NDArray[np.uint32], grid: VoxelGrid) -> F64:
-    """(voxels, techniques) weights, each of the view's times how much more light it brings to a voxel.
-
-    weights: (techniques,) of the view. counts: TechniqueCounts.numpy().
-    """
+    """(voxels, techniques) weights: the view's (techniques,), times how much more light each brings to a voxel."""
     own_counts = counts[..., : len(weights)].astype(np.uint64)
     near_vertices, near_brought = (grid.with_neighbours(rows) for rows in own_counts)
     vertices, brought = own_counts.astype(np.float64)

@@ -37,10 +37,7 @@ class DeviceFields(NamedTuple):
 
 
 class EmitterFilter(NamedTuple):
-    """Which emitters count, lane by lane: ALL_EMITTERS of the group, NO_EMITTERS, or a number.
-
-    None instead of a device value: the kernel is built without that group.
-    """
+    """Which emitters count, lane by lane: ALL_EMITTERS, NO_EMITTERS, a number; None: no kernel for the group."""
 
     indoor: Any  # Int32, lamp
     outdoor: Any  # Int32, outdoor technique (emitters.py)
@@ -198,10 +195,7 @@ def film_position(u: Any, is_tent: Any) -> Any:
 def camera_path(
     camera: DeviceCamera | LensCamera, corner: Any, offset: Any, sampler: Sampler | None = None
 ) -> PathState:
-    """The path that leaves the camera through the film at a pixel's corner plus an offset, px.
-
-    sampler: where a ray also depends on the place in the pupil and on the time.
-    """
+    """The path that leaves the camera at a pixel's corner plus an offset, px; sampler: of pupil and time."""
     origin, d = camera_ray(camera, corner, offset, sampler)
     reference = no_reference(mi.Point3f(origin))
     return _first_ray(origin, mi.Vector3f(d), mi.UInt32(0), reference, mi.Float(0))

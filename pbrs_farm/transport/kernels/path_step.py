@@ -203,10 +203,7 @@ def _next_vertex(context: PathContext, path: PathState, active: Any) -> Vertex:
 
 
 def _choose_lobe(emitters: Emitters, vertex: Vertex, path: PathState, u: Any) -> _Lobe:
-    """Reflect more of the rays at glass near lamps, and at panes before the dark or fewer before the day.
-
-    _throughput makes up for it.
-    """
+    """Reflect more rays at glass near lamps, and by light at panes; _throughput makes up for it."""
     reflectance = thin_glass_reflectance(vertex.wi.z)
     probability = reflectance
     if vertex.near is not None:
@@ -223,10 +220,7 @@ def _choose_lobe(emitters: Emitters, vertex: Vertex, path: PathState, u: Any) ->
 
 
 def _mirrored_share(emitters: Emitters, reflectance: Any, is_inner: Any) -> Any:
-    """Share of rays reflected at a pane: about in proportion to the light, at most half.
-
-    A room behind a pane is as bright as the one before it, by day and by night.
-    """
+    """Share of rays reflected at a pane: about in proportion to the light, at most half."""
     behind = (1 - reflectance) * dr.select(is_inner, 1, emitters.pane_odds)
     odds = reflectance / (reflectance + behind)
     return dr.minimum(odds, dr.maximum(reflectance, _MAX_PANE))
@@ -271,10 +265,7 @@ def _strategy(
 def _emitted_light(
     context: PathContext, path: PathState, si: SurfaceInteraction, missed: Any
 ) -> tuple[Any, Any, Any]:
-    """(outdoor, indoor) light of the emitter a ray meets; weight 1 where none could be sampled.
-
-    And the colour of what a ray shows that has left the home: white where that is the sky.
-    """
+    """(outdoor, indoor light of the emitter a ray meets, the colour shown past the home, white for the sky)."""
     emitters, emitter_filter = context.emitters, context.emitter_filter
     by_scatter = path.bsdf_pdf > 0
 

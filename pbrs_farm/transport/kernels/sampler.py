@@ -92,28 +92,18 @@ def device_array(kind: Any, values: Any) -> Any:
 
 
 def opaque3(kind: Any, values: Any) -> Any:
-    """A 3-vector of host values that the compiled kernel does not contain.
-
-    kind: Point3f, Vector3f or Color3f; values: three numbers.
-    """
+    """A Point3f, Vector3f or Color3f of host values that the compiled kernel does not contain."""
     return kind(*(dr.opaque(mi.Float, float(v)) for v in values))
 
 
 def stream_key(lane: Any, seed: Any) -> Any:
-    """A UInt32 key of a pixel (or chain, or point) under a seed, for a sampler.
-
-    Neighbouring keys are unrelated. Reserved streams (sun_rays.py) use numbers that no pixel
-    has.
-    """
+    """A UInt32 key of a pixel, chain or point under a seed; neighbouring keys are unrelated."""
     mixer: Any = mi.sample_tea_32
     return mixer(mi.UInt32(lane), mi.UInt32(seed), 4)[0]
 
 
 def hash32(x: Any) -> Any:
-    """A bijective 32-bit mixer (Wellons's `lowbias32`).
-
-    x: UInt32. Neighbouring numbers give unrelated ones; not for cryptography.
-    """
+    """A bijective 32-bit mixer of UInt32 (Wellons's `lowbias32`); not for cryptography."""
     x = x ^ (x >> 16)
     x = x * mi.UInt32(0x7FEB352D)
     x = x ^ (x >> 15)
@@ -122,18 +112,12 @@ def hash32(x: Any) -> Any:
 
 
 def unit_float(bits: Any) -> Any:
-    """Float in [0, 1) of the top 24 bits.
-
-    bits: UInt32. 24 bits, so that no rounding gives 1.
-    """
+    """Float in [0, 1) of the top 24 of 32 bits, so that no rounding gives 1."""
     return mi.Float(bits >> 8) * (1.0 / (1 << 24))
 
 
 def as_random(u: Any) -> Any:
-    """Clamp a reused random number to [0, 1), against rounding; NaN becomes 0.
-
-    Random numbers become indices, and a NaN is no index.
-    """
+    """Clamp a reused random number to [0, 1), against rounding; NaN becomes 0, since it is no index."""
     return dr.minimum(dr.fmax(u, 0), 1 - 1e-7)
 
 

@@ -32,10 +32,7 @@ class ShadowRoulette(NamedTuple):
     u: Any  # random number
 
     def cast_by_chance(self, unshadowed: Any, rate: Any) -> tuple[Any, Any]:
-        """(Bool: the ray is cast, its probability), from its unoccluded contribution before throughput.
-
-        rate: arrival rate of such rays.
-        """
+        """(Bool: the ray is cast, its probability), from its light unshadowed and such rays' arrival rate."""
         expected = luminance(self.beta * unshadowed) * rate
         chance = dr.maximum(expected / self.threshold, LEAST_CHANCE)
         chance = dr.select(expected < self.threshold, chance, mi.Float(1))
@@ -45,10 +42,7 @@ class ShadowRoulette(NamedTuple):
 def shadow_roulette(
     beta: Any, threshold: Any, sampler: Sampler, dim: Any, number: int
 ) -> ShadowRoulette | None:
-    """The roulette of one of a vertex's shadow rays; none without a throughput.
-
-    dim: the first random dimension of the vertex. number: of the shadow ray, each its own.
-    """
+    """Roulette of a vertex's shadow ray by its number; dim: the vertex's first; None without throughput."""
     if beta is None:
         return None
     return ShadowRoulette(beta, threshold, sampler.get_1d(dim + (FREE_DIM + number)))

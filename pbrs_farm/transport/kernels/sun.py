@@ -45,10 +45,7 @@ class SunDisc:
         return self._rgb / self.pdf
 
     def past_outside(self, o: Any, d: Any, active: Any) -> Any:
-        """Color3f transmittance of the surroundings towards the sun at o; 1 without surroundings.
-
-        o: Point3f; d: unit Vector3f to the sun. Undefined for inactive lanes.
-        """
+        """Color3f let through outdoors from o along unit d to the sun; 1 without surroundings."""
         return mi.Color3f(1) if self.outside is None else self.outside.lets_through(o, d, active)
 
     def sample(self, uv: Any) -> Any:
@@ -97,11 +94,7 @@ class SunPlane:
         return self._middle + x * self._a + y * self._b
 
     def cell(self, p: Any, d: Any) -> tuple[Any, Any]:
-        """(cell that the line through p in direction d crosses, whether a ray through it may meet p).
-
-        p: Point3f; d: unit Vector3f to the sun. For points too far behind the plane, or beside it,
-        the second answer is False and the cell means nothing.
-        """
+        """(cell crossed by the line through p along unit d, whether a ray through it may meet p: else no meaning)."""
         to = p - self._middle
         ahead = dr.dot(to, self._n) / dr.dot(d, self._n)
         q = to - d * ahead

@@ -66,10 +66,7 @@ def trace_sun_rays(
 def trace_lit_points(
     scene: DeviceScene, sun: SunDisc, plane: SunPlane, cells: Any, pdfs: Any, seed: int
 ) -> tuple[F32, Any]:
-    """(points that rays light (N, POINT_FLOATS), number of each one's ray (N,)).
-
-    cells: (R,) that the rays go through. pdfs: (cells,) of a ray per m2 of the plane.
-    """
+    """(points lit (N, POINT_FLOATS), number of each one's ray (N,)) of rays through cells (R,), by their pdfs."""
     key = stream_key(dr.opaque(mi.UInt32, _POINTS), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
     sampler = SobolSampler(key, dr.arange(mi.UInt32, len(cells)))
     cell = device_array(mi.UInt32, cells)
@@ -95,11 +92,7 @@ def trace_lit_points(
 def value_cells(
     scene: DeviceScene, sun: SunDisc, plane: SunPlane, grid: VoxelGrid, wanted: Any, seed: int
 ) -> tuple[F32, F32]:
-    """(points (C, 3) lit by a ray through each cell, value (C,) of that light).
-
-    wanted: (voxels,) importance of light in each. A point's value is its reflected light times the
-    importance of the voxels that receive it.
-    """
+    """(points (C, 3) lit by a ray through each cell, value (C,) of that light by importance wanted (voxels,))."""
     key = stream_key(dr.opaque(mi.UInt32, _CELLS), dr.opaque(mi.UInt32, seed & 0xFFFFFFFF))
     cell = dr.arange(mi.UInt32, plane.n_cells)
     sampler = SobolSampler(key, cell)

@@ -108,11 +108,7 @@ class SunlitPoints:
         return [weight / dr.maximum(total, 1e-30) for weight in weights]
 
     def sample(self, p: Any, u: Any, active: Any) -> SunlitSample:
-        """One of the points, as seen from p.
-
-        p: Point3f; u: Float in [0, 1). The radiance is reflected towards p, ignoring occlusion: cast a shadow
-        ray. Not valid without points.
-        """
+        """One of the points as seen from p, by u in [0, 1); radiance before occlusion; not valid without points."""
         # Choose a group, then one of its points; both in order, so that u's strata are places.
         chances = self.chances(p, active)
         total = sum(chances, mi.Float(0))

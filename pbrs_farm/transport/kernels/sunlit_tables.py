@@ -72,11 +72,7 @@ def no_points() -> SunlitTables:
 
 
 def find_used_cells(scene: DeviceScene, sun: SunDisc, grid: VoxelGrid, vertices: I64) -> UsedCells:
-    """The cells whose light matters. vertices: (voxels,) of a view's paths, not all 0.
-
-    vertices: counts of a first pass. Deterministic: its rays have a separate seed. If no ray of the sun
-    lights anything, all shares are 0.
-    """
+    """The cells whose light matters, by counts (voxels,) of a view's paths, not all 0; by its own seed."""
     # Cover the voxels that paths have been to, as the sun sees them.
     centres = grid.centres()[vertices > 0]
     corners = (np.indices((2, 2, 2)).reshape(3, -1).T - 0.5) * grid.edge_m
@@ -102,10 +98,7 @@ def find_used_cells(scene: DeviceScene, sun: SunDisc, grid: VoxelGrid, vertices:
 def trace_points(
     scene: DeviceScene, sun: SunDisc, used: UsedCells, n_samples: int, seed: int
 ) -> SunlitTables:
-    """The points that rays through the cells light, other ones for each seed.
-
-    n_samples: of the launch that they are for: there are more points for more samples, up to a number.
-    """
+    """The points that rays through the cells light, other ones for each seed, more for more samples."""
     if used.groups.max() < 0:
         return no_points()
     # Send each cell its share of the rays, in order, so that neighbours are neighbours.

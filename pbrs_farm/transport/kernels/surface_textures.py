@@ -30,10 +30,7 @@ class ShadedSurface(NamedTuple):
 
 
 def colour_at(texels: Any, slot: Any, uv: Any, active: Any) -> Any:
-    """Color3f of a colour texture.
-
-    slot: packet of first texel (bits), width and height.
-    """
+    """Color3f of a colour texture; slot: packet of first texel (bits), width and height."""
     total = mi.Color3f(0)
     # A texel holds square roots in 10 bits each.
     for bits, weight in _four_texels(texels, slot, uv, active):
@@ -44,10 +41,7 @@ def colour_at(texels: Any, slot: Any, uv: Any, active: Any) -> Any:
 
 @dr.syntax
 def is_hole_at(texels: Any, slot: Any, uv: Any, may_be_hole: Any) -> Any:
-    """Bool: alpha, whose texels follow those of the colours, is below the cutoff at uv.
-
-    slot: as of `colour_at`, and the cutoff of alpha 0..255.
-    """
+    """Bool: alpha, behind the colours' texels, is below the cutoff (0..255, in slot) at uv."""
     hole = mi.Bool(False)
     # Branch: packets of lanes on surfaces without holes pass by.
     if may_be_hole:
@@ -70,10 +64,7 @@ def follow_maps(
     roughness: Any,
     has_maps: Any,
 ) -> ShadedSurface:
-    """The surface with its roughness and normal maps, where it has any.
-
-    packet: index of the maps' slot among those of materials; roughness: its factor.
-    """
+    """The surface with its roughness and normal maps; packet: their slot's index, roughness: its factor."""
     normal, alpha = mi.Vector3f(surface.normal), mi.Float(surface.alpha)
     # Branch: packets of lanes without any map pass by.
     if has_maps:

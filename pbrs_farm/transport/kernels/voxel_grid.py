@@ -17,10 +17,7 @@ _MAX_VOXELS: Final = 1 << 16
 
 
 class VoxelGrid:
-    """Cubes that fill a home's box, numbered; what a view counts by place is counted in them.
-
-    The numbers on the device are opaque, so that the kernel is the same for every home.
-    """
+    """Cubes that fill a home's box, numbered, to count by place; opaque, so that every home has one kernel."""
 
     def __init__(self, positions: F32) -> None:
         """positions: (N, 3) of all that there is."""
@@ -42,10 +39,7 @@ class VoxelGrid:
         return np.asarray(self._host_low + (cell + 0.5) * self.edge_m)
 
     def with_neighbours(self, rows: NDArray[np.unsignedinteger]) -> NDArray[np.unsignedinteger]:
-        """(voxels, K) sums of rows over each voxel and its (up to 26) neighbours.
-
-        rows: (voxels, K) unsigned; sums keep the type, and may wrap around.
-        """
+        """(voxels, K) sums of unsigned rows (voxels, K) over each voxel and its neighbours; may wrap around."""
         sums = rows.reshape(*self._host_shape, -1)
         for axis in range(3):
             # Add the voxels before and behind, axis by axis.

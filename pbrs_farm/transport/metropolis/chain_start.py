@@ -80,10 +80,7 @@ def _draw_paths(context: ChainContext, n: int, seed: int) -> Chains:
 def bootstrap_chains(
     context: ChainContext, n_bootstrap: int, n_chains: int, seed: int
 ) -> tuple[Chains | None, float]:
-    """(chains at independent paths, drawn in proportion to I; sum of I over n_bootstrap paths).
-
-    None where no path brings light.
-    """
+    """(chains at paths drawn in proportion to I, None where no path brings light; sum of I over all paths)."""
     paths = _draw_paths(context, n_bootstrap, seed)
     key = _path_keys(n_bootstrap, seed)
     targets = paths.target.numpy().astype(np.float64)

@@ -113,10 +113,7 @@ class ChainRun:
         return self._totals.n_steps
 
     def advance(self, n_steps: int) -> None:
-        """Make n_steps more of every chain, in one launch, and share their suffixes in another.
-
-        Suffixes are shared once in ROUND_STEPS: n_steps is whole rounds, or the last steps of all.
-        """
+        """Make n_steps more of every chain (whole rounds, or the last ones), and share their suffixes."""
         first = self.n_steps
         n_rounds = -(-n_steps // ROUND_STEPS) if self._n_shared > 0 else 0
         records = no_records(max(n_rounds, 1), self.n_chains)
@@ -183,10 +180,7 @@ _StartedChains = tuple[Chains, _Totals]
 def chain_run(
     view: SampledView, group: Group, *, min_segments: int = 3, kept: Arrays | None = None
 ) -> ChainRun | None:
-    """The chains of one group that sample paths of min_segments or more (3: all but direct light).
-
-    None where no path brings light. kept: the state of a run of the same arguments, to go on from.
-    """
+    """The chains of one group, from kept if given, for paths of min_segments or more; None where all is dark."""
     if not view.emitters.has_group(group):
         return None
     i = view.camera.intrinsics

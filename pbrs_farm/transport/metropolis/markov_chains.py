@@ -333,10 +333,7 @@ def _copy(source: Any, target: Any, n: int, active: Any) -> Any:
 
 @dr.syntax
 def _record_round(how: Mutations, chain: Any, step: Any, x: _State, suffix: Any, done: Any) -> None:
-    """Record a chain's state for reconnection after the last step of a round.
-
-    step: the next one; done: whether a step has just ended.
-    """
+    """Record a chain's state for reconnection if a round's last step is done; step: the next one."""
     records = how.records
     is_end = ((step - how.first) % ROUND_STEPS == 0) | (step == how.last)
     row = (step - 1 - how.first) // ROUND_STEPS * records.n_chains + chain

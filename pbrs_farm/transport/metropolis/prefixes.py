@@ -64,11 +64,7 @@ def prefix_schedule(n_chains: int, n_pixels: int) -> PrefixSchedule:
 
 
 def trace_prefixes(context: ChainContext, n_pixels: int, sets: range, seed: int) -> Prefixes:
-    """Sets of prefixes, those of a pixel through places spread over it.
-
-    sets: numbers of the sets, in the order of a run. Invalid where a pixel does not see a rough
-    surface first.
-    """
+    """Sets of prefixes by number; invalid where a pixel does not see a rough surface first."""
     row, in_set = dr.arange(mi.UInt32, n_pixels * len(sets)), dr.opaque(mi.UInt32, n_pixels)
     pixel, number = row % in_set, row // in_set + dr.opaque(mi.UInt32, sets.start)
     key = stream_key(pixel, dr.opaque(mi.UInt32, (seed ^ _PREFIX_SEED) & 0xFFFFFFFF))

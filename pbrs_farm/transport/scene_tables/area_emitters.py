@@ -86,11 +86,7 @@ def _faces_by_surface(geometry: Geometry, keep: Bools) -> dict[int, I64]:
 def _flux_and_rgb(
     house: House, part: LightPart, k: int, item: Item, recipe: Recipe
 ) -> tuple[float, F64]:
-    """(flux in lm, colour of luminance 1) of a light part.
-
-    The source states the flux that leaves the lamp: the bulb emits that over the light output ratio,
-    part.escape. A bare part's flux is its surfaces' own.
-    """
+    """(flux in lm, colour of luminance 1) of a light part: what leaves the lamp over the output ratio part.escape."""
     e = recipe.emission
     flux = flux_lm(part.power, part.unit, part.share, lamp_lm=e.lamp_lm, lm_per_watt=e.lm_per_watt)
     if e.compensate_shades and part.escape is not None and not part.is_bare:

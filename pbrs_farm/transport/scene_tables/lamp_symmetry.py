@@ -21,11 +21,7 @@ _MAX_FACES: Final = (
 
 
 def symmetry_row(corners: F64) -> F32:
-    """(4,) centre and radius in m of a lamp of triangles (T, 3, 3).
-
-    The radius is of the sphere around it: negative where its triangles face inwards, 0 where it is
-    not convex, closed and symmetric.
-    """
+    """(4,) centre and radius, m, of a lamp of triangles (T, 3, 3): < 0 faces inwards, 0 not symmetric or convex."""
     centre = 0.5 * (corners.min((0, 1)) + corners.max((0, 1)))
     row = np.zeros(4, np.float32)
     row[:3] = centre

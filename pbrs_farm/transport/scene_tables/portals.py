@@ -34,10 +34,7 @@ def portals_of_house(house: House) -> F64:
 
 
 def panes_of_house(house: House) -> House | None:
-    """The house's window panes alone; None without panes.
-
-    Those between two rooms are of the kind mirror, others clear glass.
-    """
+    """The house's window panes alone, mirrors between rooms, else clear glass; None without panes."""
     is_pane = [m.kind is MaterialKind.PANE for m in house.materials]
     clear = Material("pane", kind=MaterialKind.GLASS, opacity=0.0)
     inner, between = len(house.materials), Material("inner pane", kind=MaterialKind.MIRROR)

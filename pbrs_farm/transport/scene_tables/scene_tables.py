@@ -40,11 +40,7 @@ FACES_AT_ONCE: Final = 1 << 13  # in the making of rows, against memory
 
 @dataclass(frozen=True, slots=True, eq=False)
 class SceneTables:
-    """A house as the arrays that the kernels gather from; plain numpy.
-
-    `tables_from_house` makes them; `DeviceScene` and `Emitters` copy them to the device. V
-    vertices, F faces, M materials, L lamps with T triangles.
-    """
+    """A house as numpy arrays that kernels gather from: V vertices, F faces, M materials, L lamps."""
 
     positions: F32  # (V, 3) vertices of Mitsuba's mesh
     faces: I32  # (F, 3), without degenerate ones
@@ -126,10 +122,7 @@ def tables_from_house(
 
 
 def moved_rows(geometry: Geometry, tables: SceneTables, faces: I64) -> F32:
-    """(N, FACE_FLOATS) rows of faces (N,) of tables, with the vertices of a geometry.
-
-    geometry: of the same house, with moved vertices. Guiding's entries are 0.
-    """
+    """(N, FACE_FLOATS) rows of faces (N,) at a geometry of the same house, moved; guiding's entries are 0."""
     return rows_of_faces(geometry, tables.faces[faces])
 
 

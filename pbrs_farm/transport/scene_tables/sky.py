@@ -137,10 +137,7 @@ def sky_for_house(
 
 
 def _sun_of_house(recipe: Recipe, house_id: str) -> tuple[float, float, bool]:
-    """The sun's elevation and azimuth in rad, and whether clouds hide it.
-
-    What the recipe does not say is drawn by seeds of the house.
-    """
+    """The sun's elevation and azimuth, rad, and whether clouds hide it: of the recipe or by seeds of the house."""
     fields = recipe.sky
     low, high = _SUN_ELEVATION_DEG
     elevation = math.radians(low + (high - low) * _uniform(house_id, recipe.seed, "elevation"))

@@ -46,10 +46,7 @@ def map_key(material: Material) -> MapKey:
 def texture_atlas(
     house: House, textures: dict[str, Picture], *, with_roughness: bool = True
 ) -> TextureAtlas:
-    """The atlas of the textures that materials use, without those that could not be decoded.
-
-    with_roughness False leaves out the roughness maps.
-    """
+    """The atlas of the decoded textures that materials use, with or without roughness maps."""
     # Leave texel 0 out: a first texel of 0 means that there is no texture.
     parts: list[NDArray[np.uint32]] = [np.zeros(1, np.uint32)]
     pictures = {name: p for name, p in textures.items() if p.size}

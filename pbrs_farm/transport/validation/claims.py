@@ -84,10 +84,7 @@ class LightClaim:
 
 
 def light_claims(variant: str) -> Iterator[LightClaim]:
-    """Every claim, measured one after the other in a Mitsuba variant, in a minute on two cores.
-
-    Raises MachineFailed in a scalar variant: our kernels do not run there.
-    """
+    """Every claim, measured one after the other in a Mitsuba variant; raises MachineFailed in a scalar one."""
     if variant.startswith("scalar"):
         text = "the light's kernels need LLVM or CUDA, so scalar_rgb cannot be checked"
         hint = "sudo apt-get install -y libllvm19"

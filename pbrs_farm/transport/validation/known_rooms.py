@@ -193,10 +193,7 @@ def window_room(
 
 
 def furnace(albedo: float) -> tuple[House, Camera]:
-    """A furnace: a closed box whose walls all emit luminance 1 and reflect albedo.
-
-    Luminance is the same everywhere: 1 + albedo + albedo^2 + ..., one term a path segment.
-    """
+    """A closed box whose walls emit luminance 1 and reflect albedo: everywhere 1 + albedo + albedo^2 + ..."""
     walls = box((0, 0, 0), (4, 2.5, 4), 0)
     # Give the lamp the flux that makes its radiance 1 W m-2 sr-1: 179 lm/W x pi x area.
     area = 2 * (4 * 2.5 + 4 * 2.5 + 4 * 4)
@@ -211,10 +208,7 @@ def furnace(albedo: float) -> tuple[House, Camera]:
 
 
 def door_ajar(gap: float = 0.06) -> tuple[House, Camera]:
-    """Two rooms, a lamp in the far one, and a door between them ajar by gap metres.
-
-    The lamp does not light the near room directly: all light is reflected by the far walls through the gap.
-    """
+    """Two rooms, a lamp in the far one, and a door ajar by gap metres: all light of the near one is reflected."""
     size = (4.0, 2.5, 8.2)
     surfaces = shell(size, 0)
     # Part the rooms by a wall 10 cm thick, and let the door leave the gap free.
