@@ -20,6 +20,7 @@ import tokenize
 import warnings
 from pathlib import Path
 from typing import Any, Final
+from xml.etree import ElementTree
 
 import numpy as np
 import trimesh
@@ -43,6 +44,10 @@ UNITS: Final = {
     "python.warm_overhead": "seconds a warm view takes over those of its steps in `run`",
     "python.examples": "scripts under examples/",
     "python.shorter": "share of the peers' examples whose counterpart here has fewer lines of code",
+    "python.wrong_calls": "wrong calls in tests/scene/test_wrong_calls.py",
+    "python.wrong_calls_silent": "of them: accepted, or without one line that names the argument",
+    "cli.wrong_lines": "wrong command lines in tests/cli/test_command_line.py",
+    "cli.tracebacks": "of them: accepted, or without one line that says what is wrong",
     "python.physics_scatterings": "scatterings of 20 items on a table, seeds 0...",
     "python.physics_settled": "share of them that came to rest",
     "python.physics_penetration_mm": "mm, deepest contact of any, as MuJoCo measures it",
@@ -58,9 +63,24 @@ def main() -> None:
         "python.examples": len(list(EXAMPLES.glob("*.py"))),
         "python.shorter": shorter(),
     }
+    calls = outcomes("tests/scene/test_wrong_calls.py", "names_the_argument or unknown_argument")
+    lines = outcomes("tests/cli/test_command_line.py", "misspelling")
+    figures |= {"python.wrong_calls": sum(calls), "python.wrong_calls_silent": calls[1]}
+    figures |= {"cli.wrong_lines": sum(lines), "cli.tracebacks": lines[1]}
     figures |= against_run()
     figures |= of_physics(int(os.environ.get("PBRS_SCATTERINGS", "10")))
     write_report("python", figures, UNITS)
+
+
+def outcomes(file: str, words: str) -> tuple[int, int]:
+    """Passed and failed tests of a file whose names have the words."""
+    with tempfile.TemporaryDirectory() as folder:
+        report = Path(folder) / "report.xml"
+        command = ["-m", "pytest", "-q", file, "-k", words, f"--junitxml={report}"]
+        subprocess.run([sys.executable, *command], cwd=REPO, capture_output=True)
+        (suite,) = ElementTree.parse(report).getroot()
+    failed = int(suite.get("failures", 0)) + int(suite.get("errors", 0))
+    return int(suite.get("tests", 0)) - failed, failed
 
 
 def import_ms() -> float:
