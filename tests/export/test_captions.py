@@ -186,7 +186,7 @@ def test_an_export_has_a_line_a_view_and_its_picture(tmp_path):
     home = small_home()
     cameras = home.cameras(n=2)
     pf.render(home, cameras, modes=["opengl_dl"]).save(tmp_path / "root")
-    assert export(tmp_path / "root", tmp_path / "out", "captions") == (2, 3)
+    assert export(tmp_path / "root", tmp_path / "out", "captions") == (2, 4)
     lines = (tmp_path / "out/captions.jsonl").read_text("utf-8").splitlines()
     for line in map(json.loads, lines):
         assert list(line) == ["file_name", "text", "objects", "relations"]

@@ -117,7 +117,7 @@ def test_another_lens_needs_positions(tmp_path):
     with pytest.raises(BadInput, match=r"fisheye needs the layer position .*with layers position"):
         export(tmp_path / "none", tmp_path / "x", "ply")
     pf.render(home, camera, modes=[], layers=["position"]).save(tmp_path / "some")
-    assert export(tmp_path / "some", tmp_path / "y", "ply") == (1, 1)
+    assert export(tmp_path / "some", tmp_path / "y", "ply") == (1, 2)
     vertices, _ = read_ply(next((tmp_path / "y").rglob("*.ply")))
     floor = vertices[vertices["label"] == 2]
     assert "red" not in vertices.dtype.names
