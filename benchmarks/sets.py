@@ -33,6 +33,7 @@ UNITS: Final = {
     "sets.forms_written": "forms of views",
     "sets.forms_wrong": "names of the other forms",
     "sets.same_bytes": "1: one set's file gave the same bytes in each of three folders",
+    "sets.licences_wrong": "views of homes for CC0 alone that name another licence, and files of credits",
     "sets.questions": "questions of pictures and walks",
     "sets.questions_wrong": "questions with another answer by a checker of its own",
     "sets.blind_best": "largest share of right answers by always giving the same one of four",
@@ -90,7 +91,11 @@ def main() -> None:
     # The forms' tests run in another process, beside the other parts.
     with ThreadPoolExecutor(1) as beside:
         passing = beside.submit(_passed)
-        figures_of_sets = {"sets.same_bytes": int(_is_made_alike()), **_questions()}
+        figures_of_sets = {
+            "sets.same_bytes": int(_is_made_alike()),
+            "sets.licences_wrong": _licences_wrong(),
+            **_questions(),
+        }
         passed = passing.result()
     figures_of_sets |= stream_figures()
     wrong = [form for form in READ_BACK if not _is_equal(form, passed)]
@@ -153,6 +158,18 @@ def _is_made_alike() -> bool:
         ]
     print("   a set of", len(sums[0].splitlines()), "files", flush=True)
     return len(set(sums)) == 1 and not any(done.returncode for done in checked)
+
+
+def _licences_wrong() -> int:
+    """Files of credits and views that name another licence, in dressed homes for which CC0 is chosen."""
+    with tempfile.TemporaryDirectory() as folder:
+        _pbrs_farm(
+            "run", _PICTURES, "--dress", "1", "--set", "dress.licences=CC0", "--recipe", "preview",
+            "--size", "64x48", "--modes", "opengl_dl", "--views", "4", "--jobs", "2", "--out", folder,
+        )  # fmt: skip
+        entries = finished_entries(Path(folder))
+        wrong = [v for v in entries if set(v.facts["licences"]) != {"CC0"}]
+        return len(wrong) + len(list(Path(folder).rglob("ATTRIBUTION.txt")))
 
 
 def _killed(*words: str) -> None:

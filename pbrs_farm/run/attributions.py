@@ -69,8 +69,8 @@ def licences_of_view(
 ) -> dict[str, list[str]]:
     """Licence -> ids of the library's models and pictures on the items of these rows of view.json, and of the home.
 
-    All pictures of an item count, on its hidden sides too. The home counts, by its file, if an item of its own is
-    visible. Generated items, and homes and models without a named licence, are not listed.
+    All pictures of an item count, on its hidden sides too. The home counts, by its file, if one of its
+    items is visible. Generated items, and homes and models without a named licence, are not listed.
     """
     items = [house.items[int(row["id"]) - 1] for row in instances]
     shown = {piece_id(item) for item in items}

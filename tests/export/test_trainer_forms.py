@@ -252,6 +252,26 @@ def test_covisibility_ends_at_a_wall() -> None:
     opposite = FramePoints(depth - np.float32(0.25), k, np.linalg.inv(turned), thick, 100)
     shares = pairwise_covisibility([same, same, opposite])
     np.testing.assert_array_equal(shares, [[1, 1, 0], [1, 1, 0], [0, 0, 1]])
+    # Frames without a surface see nothing.
+    none = FramePoints(np.zeros_like(depth), k, np.eye(4), np.zeros((0, 3)), 100)
+    np.testing.assert_array_equal(pairwise_covisibility([same, none]), [[1, 0], [0, 0]])
+
+
+def test_points_outside_a_frames_pyramid_are_left_out_unseen() -> None:
+    from pbrs_farm.export.forms.wai import FramePoints, _box_corners, _may_see, _n_seen
+
+    rng = np.random.default_rng(4)
+    k = np.array([[10.0, 0, 5], [0, 10, 5], [0, 0, 1]])
+    n_left_out = 0
+    for _ in range(200):
+        pose = np.eye(4)
+        pose[:3, :3] = Rotation.random(rng=rng).as_matrix()
+        frame = FramePoints(np.full((10, 10), 2, np.float32), k, pose, np.zeros((0, 3)), 1)
+        points = rng.normal(size=(20, 3)) * 0.5 + rng.normal(size=3) * 3
+        if not _may_see(_box_corners(points), frame):
+            n_left_out += 1
+            assert _n_seen(points, frame) == 0
+    assert n_left_out > 50
 
 
 def test_nerfstudios_normals_and_linear_pictures(stills: Path, tmp_path: Path) -> None:

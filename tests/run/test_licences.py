@@ -4,9 +4,15 @@ from __future__ import annotations
 
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
+from typing import cast
 
 import pytest
 
+from pbrs_farm.check.cases import ViewCase
+from pbrs_farm.check.certificate import Tally
+from pbrs_farm.check.fact_checks import _check_licences
+from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import Catalogue, Picture, Piece, Place
 from pbrs_farm.core.errors import BadRecipe
@@ -14,6 +20,7 @@ from pbrs_farm.core.house import Texture
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.dress.report import Credit, DressReport
 from pbrs_farm.export.export_views import export
+from pbrs_farm.formats.house_bundle import bundle_from_house
 from pbrs_farm.formats.serialise import json_bytes
 from pbrs_farm.prepare.dress_catalogue import catalogue_of
 from pbrs_farm.read.builtin.builtin_home import builtin_home
@@ -27,7 +34,7 @@ def credit(of: str, licence: str) -> Credit:
     return Credit(id=of, name=of, library="lib", creator="somebody", licence=licence, n=1)
 
 
-def test_a_view_lists_the_licences_of_its_visible_models_and_pictures() -> None:
+def test_a_view_lists_the_licences_of_its_visible_models_and_pictures(tmp_path: Path) -> None:
     home = builtin_home()
     pictured = next(
         k
@@ -57,6 +64,20 @@ def test_a_view_lists_the_licences_of_its_visible_models_and_pictures() -> None:
     rows.append({"id": len(home.items)})
     assert licences_of_view(store, home, rows)["Apache-2.0"] == ["builtin"]
     assert licences_of_view(MemoryStore(), home, rows[:1]) == {}
+    # `verify` finds the same from house.json and dress.json, and every change of it.
+    (tmp_path / "house.json").write_bytes(bundle_from_house(home)[1])
+    (tmp_path / "dress.json").write_bytes(json_bytes(report))
+    listed = licences_of_view(store, home, rows)
+    wrong = [listed | {"CC0": []}, {**listed, "CC-BY 4.0": ["lib#9"]}, {"CC0": listed["CC0"]}]
+    for licences in (listed, *wrong):
+        tally = Tally()
+        case = SimpleNamespace(
+            house=StoredHouse(tmp_path),
+            view=SimpleNamespace(table={"instances": rows, "licences": licences}),
+            expect=lambda check, tally=tally: tally.at(check, "a view"),
+        )
+        _check_licences(cast(ViewCase, case))
+        assert tally.n_failed == (licences != listed)
 
 
 def test_a_catalogue_of_chosen_licences() -> None:

@@ -39,7 +39,7 @@ def write_interiorverse(views: list[ChosenView], out: Path, _choice: Choice) -> 
     im is the radiance that the picture developed, times its white balance and exposure, so that clipped to 0..1
     it is a picture; without radiance.exr, or of OpenGL, the picture in linear colours. albedo is linear. material:
     R roughness, G metallic. normal: OpenGL's camera axes. depth: mm along the axis, three times, infinite without a
-    surface. mask: 1 = a surface that is neither glass nor a mirror, if the views have these layers. A house's name
+    surface. mask: 1 = a surface, but no glass or mirror if the views have these layers. A house's name
     has "-im" for "_im". left_out.txt names views without the layers; BadInput if none has them.
     """
     chosen = [view for view in views if view.picture is not None and all(map(view.has, _LAYERS))]

@@ -30,7 +30,7 @@ from pbrs_farm.export.sequences import pose_opencv
 from pbrs_farm.images import exr_from_layers
 
 _COVISIBILITY: Final = "covisibility/v0"
-_LONG_SIDE: Final = 224  # of the grid of points that are looked for in other frames
+_LONG_SIDE: Final = 224  # of the grid of points, pixels
 _LEAST_Z_M: Final = 0.04  # of a point in the other frame
 # A point is seen if depth differs by less than 0.1 m + 0.5 % - ln(0.5) x 0.1 m, as in the repository.
 _WITHIN_M: Final = 0.1 - math.log(0.5) * 0.1
@@ -124,16 +124,35 @@ def _frame_points(view: ChosenView) -> FramePoints:
 
 
 def pairwise_covisibility(frames: list[FramePoints]) -> F32:
-    """(N, N) float32 in row i and column j: the share of frame i's grid that is also seen in frame j.
+    """(N, N) float32: in row i and column j the share of frame i's grid that frame j sees, too.
 
-    A point is seen if it lies in j's picture and j's depth at its pixel is its own. Depth is that of each pixel
-    of the full picture, where the repository reduces it to 224 px.
+    A point is seen if it is in j's picture and the depth there is its own. Depth is that of the full picture,
+    where the repository reduces it to 224 px.
     """
     matrix = np.zeros((len(frames), len(frames)), np.float32)
     for i, frame in enumerate(frames):
+        corners = _box_corners(frame.points)
         for j, other in enumerate(frames):
-            matrix[i, j] = _n_seen(frame.points, other) / frame.n_grid
+            if _may_see(corners, other):
+                matrix[i, j] = _n_seen(frame.points, other) / frame.n_grid
     return matrix
+
+
+def _box_corners(points: F64) -> F64:
+    """(8, 3) corners of the box around the points; none without points."""
+    if not len(points):
+        return points
+    ends = np.stack([points.min(0), points.max(0)])
+    return np.array([[ends[k >> axis & 1, axis] for axis in range(3)] for k in range(8)])
+
+
+def _may_see(corners: F64, frame: FramePoints) -> bool:
+    """False if all corners of a box are outside one side of the frame's pyramid."""
+    height, width = frame.depth.shape
+    pose = frame.camera_from_world
+    x, y, z = ((corners @ pose[:3, :3].T + pose[:3, 3]) @ frame.k.T).T
+    sides = (z - _LEAST_Z_M, x, y, width * z - x, height * z - y)
+    return bool(len(corners)) and all(bool((side >= 0).any()) for side in sides)
 
 
 def _n_seen(points: F64, frame: FramePoints) -> int:
