@@ -76,11 +76,11 @@ class Rasterizer:
         self._programs: dict[tuple[str, int], tuple[Any, Any]] = {}
         self._queries = [self._context.query(samples=True) for _ in range(self._mesh.n_draws)]
         self._targets: dict[tuple[int, int], RenderTarget] = {}  # (width, height)
-        self._upload(house, textures, n_lights)
+        self._pictures = textures
+        self._textures: dict[str, Any] = {}  # uploaded so far, by id
+        self._upload(house, n_lights)
 
-    def _upload(
-        self, house: House, textures: Mapping[str, NDArray[np.uint8]], n_lights: int
-    ) -> None:
+    def _upload(self, house: House, n_lights: int) -> None:
         gl, alignment = self._context, self._context.info["GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT"]
         # Upload the mesh; OpenGL takes no empty buffer.
         self._vertices = gl.buffer(self._mesh.vertices.tobytes() or bytes(32))
@@ -92,18 +92,18 @@ class Rasterizer:
         self._material_step = material_rows[:1].nbytes
         self._lights, self._light_step = gl.buffer(light_rows.tobytes()), light_rows[:1].nbytes
         self._light_bytes = 4 * (4 + LIGHT_FLOATS * n_lights)
-        # Upload the textures in use; a material without one samples a white texel.
-        used = {m.texture_id for m in house.materials}
-        used_textures = (
-            (name, pixels) for name, pixels in sorted(textures.items()) if name in used
-        )
-        repeating = _repeating_textures(house)
-        uploaded = {
-            name: texture_from_pixels(gl, pixels, ((name, 0) in repeating, (name, 1) in repeating))
-            for name, pixels in used_textures
-        }
-        white = texture_from_pixels(gl, np.full((1, 1, 3), 255, np.uint8))
-        self._textures = [uploaded.get(m.texture_id or "", white) for m in house.materials]
+        self._repeating = _repeating_textures(house)
+
+    def _texture(self, material: int) -> Any:
+        """The texture of a material, uploaded at its first draw: a view shows few rooms' textures."""
+        name = self._house.materials[material].texture_id or ""
+        name = name if name in self._pictures else ""
+        if name not in self._textures:
+            # A material without a texture samples a white texel.
+            pixels = self._pictures[name] if name else np.full((1, 1, 3), 255, np.uint8)
+            repeats = (name, 0) in self._repeating, (name, 1) in self._repeating
+            self._textures[name] = texture_from_pixels(self._context, pixels, repeats)
+        return self._textures[name]
 
     def draw_house(self, house: House) -> None:
         """Draw the house with rigidly moved parts from now on; uploads only moved vertices."""
@@ -169,8 +169,7 @@ class Rasterizer:
             target = self._target(camera)
             clip = clip_from_world(camera, far_plane(camera, *self._boxes))
             order = self._front_to_back(camera, clip)
-            if mode == "il":
-                order = self._visible_draws(target, order, clip)
+            order = self._visible_draws(target, order, clip)
             # Draw opaque surfaces program by program, then blend the transparent ones over them.
             features = self._features[self._mesh.draw_material[order]]
             target.begin((*self._sky, 1.0))
@@ -233,7 +232,7 @@ class Rasterizer:
         if mode == "il":
             offset = int(self._mesh.draw_item[draw]) * self._light_step
             self._lights.bind_to_uniform_block(1, offset=offset, size=self._light_bytes)
-        self._textures[material].use(0)
+        self._texture(material).use(0)
 
     def _draw(self, vao: Any, draw: int) -> None:
         count, first = int(self._mesh.draw_count[draw]), int(self._mesh.draw_first[draw])
