@@ -51,7 +51,7 @@ BENCHES: Final = {
     "inputs": Bench("inputs", "reading and repair of every format", 15, in_all=False),
     "python": Bench("python_api", "docs/compare.md: lines of the peers' examples and ours", 1),
     "docs": Bench("docs_figures", "how the docs read; stale figures", 1, in_all=False),
-    "release": Bench("release", "docs/lab/views.md: wheel, sdist, empty environment", 4, in_all=False),
+    "release": Bench("release", "docs/lab/views.md: wheels, sdists, an empty environment of each Python", 10, in_all=False),
     "anywhere": Bench("anywhere", "docs/install.md: pip alone on a bare machine", 6, in_all=False),
     "gpu": Bench("light.gpu", "docs/light_costs.md: on a GPU", 5, in_all=False),
     "lab_tables": Bench("lab_tables", "writes the tables of the lab book from the reports", 0, in_all=False),

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, F64, Mask, Matrix4
-from pbrs_farm.core.checked_calls import Size, Vector, checked_call
+from pbrs_farm.core.checked_calls import Size, Vector, check_argument, checked_call
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.frames import OPENCV_FROM_OPENGL, affine
 from pbrs_farm.core.lenses import COEFFICIENTS, PINHOLE, Lens, lens_of_opencv
@@ -201,12 +201,7 @@ class Camera:
     has_own_size: bool = True  # False: it takes the size of the recipe it is rendered with
 
     def __post_init__(self) -> None:
-        if not isinstance(self.intrinsics, Intrinsics):
-            text, hint = (
-                "expected Intrinsics",
-                "Camera.look_at(...) and Camera.from_opencv(...) give them",
-            )
-            raise BadInput("Camera", "intrinsics", text, hint=hint)
+        check_argument("Camera", "intrinsics", self.intrinsics, Intrinsics)
         if np.shape(self.world_from_camera) != (4, 4):
             raise BadInput("Camera", "world_from_camera", "expected a (4, 4) matrix")
 

@@ -81,6 +81,7 @@ _GIVEN_BY: Final = {
     "Home": 'pf.load("builtin") gives one',
     "Model": 'pf.model("mug.glb") gives one',
     "Camera": "pf.Camera.look_at(...) and home.cameras() give some",
+    "Intrinsics": "pf.Camera.look_at(...) makes them",
     "Viewpoint": "home.cameras() gives some",
     "Views": 'pf.open("out") gives them',
     "Packing": "pf.Packing(...)",
