@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Iterator
+from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -88,6 +89,9 @@ def _compiled(given: GivenFile) -> tuple[Any, Any, list[bool]]:
         for mesh in spec.meshes:
             # Open and flat meshes have no volume.
             mesh.inertia = mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL
+            if mesh.file and not spec.strippath:
+                # MuJoCo 3 stores a path without its folder, and geoms.py reads the file.
+                mesh.file = str(Path(spec.modelfiledir, spec.meshdir, mesh.file))
         collides = [bool(geom.contype or geom.conaffinity) for geom in spec.geoms]
         for geom in spec.geoms:
             # Nothing is simulated: no hull need be found.
