@@ -19,6 +19,8 @@ from pathlib import Path
 from typing import Any, Final
 from xml.etree import ElementTree
 
+from benchmarks.blind_pairs import UNITS as UNITS_OF_PAIRS
+from benchmarks.blind_pairs import blind_figures
 from benchmarks.figures import write_report
 from benchmarks.stream_wait import UNITS as UNITS_OF_STREAM
 from benchmarks.stream_wait import stream_figures
@@ -39,6 +41,7 @@ UNITS: Final = {
     "sets.blind_best": "largest share of right answers by always giving the same one of four",
     "sets.blind": "score of the best blind answer, by type",
     **UNITS_OF_STREAM,
+    **UNITS_OF_PAIRS,
     "layers.depth_layers_wrong": "pixels of panes, a box of glass and a wall whose surfaces along the ray are not those of the closed form",
     "lens.error_px": "largest distance of 40 points from the pixels of cv2.projectPoints, and of these found again",
     "sets.curated": "views that each rule of `select --by` leaves out of the pictures and walks of the questions",
@@ -189,7 +192,7 @@ def _questions() -> dict[str, Any]:
     curated: Counter[str] = Counter()
     with tempfile.TemporaryDirectory() as folder:
         for name, homes, how in (
-            ("pictures", _PICTURES, ["--views", "6"]),
+            ("pictures", _PICTURES, ["--views", "12"]),
             ("walks", _WALKS, ["--cameras", "walk", "--frames", "150", "--fps", "10"]),
         ):
             root, out = Path(folder, name), Path(folder, f"{name}_questions")
@@ -207,10 +210,11 @@ def _questions() -> dict[str, Any]:
                 for row in csv.DictReader(file):
                     n += int(row["questions"])
                     scores[f"{name} {row['question_type']}"] = float(row["constant_score"])
+        of_pairs = blind_figures([Path(folder, "pictures_questions")])
     best = [score for name, score in scores.items() if name.split()[1] in _CHOICES_OF_FOUR]
     return {
         "sets.questions": n, "sets.questions_wrong": n_wrong, "sets.blind_best": max(best),
-        "sets.blind": scores, "sets.curated": dict(sorted(curated.items())),
+        **of_pairs, "sets.blind": scores, "sets.curated": dict(sorted(curated.items())),
     }  # fmt: skip
 
 

@@ -159,9 +159,12 @@ def wrong_answers(
     kept: (house, view) of the frames of walks, None for all.
     """
     scenes: dict[str, _Scene] = {}
+    pairs: dict[int, list[dict[str, Any]]] = {}
     wrong = []
     for line in (export / "questions.jsonl").read_text("utf-8").splitlines():
         row = json.loads(line)
+        if row["question_type"].startswith("pair_"):
+            pairs.setdefault(row["pair"], []).append(row)
         name = row["scene_name"]
         if name not in scenes:
             scenes.clear()
@@ -169,6 +172,11 @@ def wrong_answers(
         fault = _fault(scenes[name], row)
         if fault:
             wrong.append(f"{row['id']} {row['question_type']}: {fault}: {row['question']}")
+    for number, rows in pairs.items():
+        is_one = len({(row["question"], *row["options"]) for row in rows}) == 1
+        n_other = [len({row[name] for row in rows}) for name in ("ground_truth", "scene_name")]
+        if not is_one or len(rows) != 2 or n_other != [2, 2]:
+            wrong.append(f"pair {number}: is not one question with another answer in two pictures")
     return wrong
 
 
@@ -180,6 +188,8 @@ def _fault(scene: _Scene, row: dict[str, Any]) -> str:
         if truth not in options:
             return f"has no option {truth}"
         truth = options[truth]
+    if kind == "pair_hidden" and truth == "cannot be told":
+        return _fault_of_hidden(scene, about)
     if kind != "object_counting" and any(len(scene.namesakes(k)) != 1 for k in about):
         return "a word fits more than one thing"
     if kind == "object_counting":
@@ -194,11 +204,25 @@ def _fault(scene: _Scene, row: dict[str, Any]) -> str:
     if kind == "room_size_estimation":
         area = _area_entered_m2(scene)
         return "" if abs(area - float(truth)) <= 0.0501 else f"it is {area:.2f} m2"
-    if kind == "object_rel_distance":
+    if kind == "room_visits":
+        n_visits = _n_visits(scene, row["question"])
+        return "" if n_visits == int(truth) else f"there are {n_visits}"
+    if kind in ("pair_lamp", "pair_open"):
+        item = scene.house["items"][about[0] - 1]
+        powers = [light["power"] for light in item["lights"]]
+        values = (
+            powers if kind == "pair_lamp" else [joint["value"] for joint in item.get("joints", ())]
+        )
+        return "" if values and (max(values) > 0) == (truth == "yes") else f"it is {values}"
+    if kind in ("pair_nearer", "pair_hidden"):
+        eye = np.array(scene.views[0]["world_from_camera_opencv"])[:3, 3]
+        nearest = min(about, key=lambda k: float(scene.tree(k).query(eye)[0]))
+        return "" if _fits(scene.rows[nearest], truth) else f"instance {nearest} is nearer"
+    if kind in ("object_rel_distance", "pair_nearest"):
         gaps = {_gap_m(scene, about[0], k): k for k in about[1:]}
         nearest = gaps[min(gaps)]
         return "" if _fits(scene.rows[nearest], truth) else f"instance {nearest} is nearer"
-    if kind.startswith("object_rel_direction"):
+    if kind.startswith("object_rel_direction") or kind == "pair_side":
         angle = _angle_deg(*(scene.middle(k) for k in about))
         return "" if _is_there(kind, angle, truth) else f"it is at {angle:.0f} degrees"
     if kind == "obj_appearance_order":
@@ -235,11 +259,37 @@ def _angle_deg(stand: Array, face: Array, to: Array) -> float:
 
 def _is_there(kind: str, angle: float, word: str) -> bool:
     left_right = angle > 0 if "right" in word else angle < 0
-    if kind.endswith("easy"):
+    if kind.endswith(("easy", "side")):
         return left_right and _CONE_DEG <= abs(angle) <= 180 - _CONE_DEG
     if kind.endswith("medium"):
         return abs(angle) > 135 if word == "back" else left_right and abs(angle) < 135
     return left_right and (abs(angle) < 90 if word.startswith("front") else abs(angle) > 90)
+
+
+def _fault_of_hidden(scene: _Scene, about: list[int]) -> str:
+    """Why nothing hides exactly one of two items of the camera's room; "" if something does."""
+    hidden = [k for k in about if k not in scene.rows]
+    if len(hidden) != 1:
+        return f"{len(hidden)} of the two are hidden"
+    item, table = scene.house["items"][hidden[0] - 1], scene.views[0]
+    pose = np.array(table["world_from_camera_opencv"])
+    ahead = (scene.home.points(item["id"]) - pose[:3, 3]) @ pose[:3, 2]
+    is_there = item["room_id"] == table["room"] and bool((ahead > 0).mean() > 0.5)
+    return "" if is_there else f"instance {hidden[0]} is not in front of the camera"
+
+
+def _n_visits(scene: _Scene, question: str) -> int:
+    """Number of stays of the camera in the room of a question."""
+    rooms = [r for r in scene.house["rooms"] if f"in the {r['name'].lower()}" in question]
+    if not rooms:
+        return 0
+    room = max(rooms, key=lambda r: len(r["name"]))
+    ring = np.array(room["polygon"])
+    eyes = [np.array(t["world_from_camera_opencv"])[:3, 3] for t in scene.views]
+    is_in = [
+        room["floor_y"] <= e[1] <= room["ceiling_y"] and _is_inside(ring, e[[0, 2]]) for e in eyes
+    ]
+    return sum(now and not before for before, now in zip([False, *is_in], is_in, strict=False))
 
 
 def _first_frame(scene: _Scene, instance: int) -> int:

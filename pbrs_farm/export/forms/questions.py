@@ -22,6 +22,7 @@ from pbrs_farm.export.form import REMARKS, Convention, ViewForm, name_left_out
 from pbrs_farm.export.forms.coco import annotations_of, categories_of
 from pbrs_farm.export.questions.asking import DATASET, Asker, Question, blind_scores
 from pbrs_farm.export.questions.clips import Clip, clips_of
+from pbrs_farm.export.questions.pairs import clips_by_home, pair_questions
 from pbrs_farm.export.questions.references import Reference, references_of
 from pbrs_farm.export.sequences import pace_of, picture_of, required_picture
 from pbrs_farm.formats.film_mp4 import film
@@ -50,11 +51,15 @@ def write_questions(views: list[ChosenView], out: Path, choice: Choice) -> None:
     asker, questions, media = Asker(), [], {}
     pictures: list[tuple[Clip, list[Reference]]] = []
     (out / DATASET).mkdir()
-    for clip in clips_of(shown):
-        media[clip.name] = _write_medium(clip, out)
-        questions += asker.asked([clip])
-        if not clip.is_walk:
-            pictures.append((clip, references_of(clip)))
+    pairs: list[Question] = []
+    for clips in clips_by_home(clips_of(shown)):
+        for clip in clips:
+            media[clip.name] = _write_medium(clip, out)
+            questions += asker.asked([clip])
+            if not clip.is_walk:
+                pictures.append((clip, references_of(clip)))
+        pairs += pair_questions(clips, len(pairs) // 2)
+    questions += pairs
     _write_rows(questions, media, out)
     _write_references(pictures, media, choice, out)
     remarks = _write_blind_scores(questions, out)
@@ -81,7 +86,7 @@ def _write_rows(questions: Sequence[Question], media: dict[str, str], out: Path)
     pq.write_table(pa.Table.from_pylist(rows, _SCHEMA), out / "questions.parquet")
     _write_lines(
         (
-            row | {"media": media[q.clip], "instances": list(q.about)}
+            row | {"media": media[q.clip]} | q.facts()
             for row, q in zip(rows, questions, strict=True)
         ),
         out / "questions.jsonl",

@@ -33,6 +33,7 @@ class Question:
     ground_truth: str  # a number, or the letter of an option
     options: tuple[str, ...]  # "A. left", ...; () for a number
     about: tuple[int, ...]
+    pair: int = -1  # number of the minimal pair (pairs.py); -1 = none
 
     @property
     def answer(self) -> str:
@@ -40,6 +41,11 @@ class Question:
         if not self.options:
             return self.ground_truth
         return self.options[_LETTERS.index(self.ground_truth)].partition(". ")[2]
+
+    def facts(self) -> dict[str, Any]:
+        """Entries of questions.jsonl beside the columns: instances, and the number of the minimal pair."""
+        pair = {} if self.pair < 0 else {"pair": self.pair}
+        return {"instances": list(self.about), **pair}
 
     def row(self, number: int) -> dict[str, Any]:
         """The columns of VSI-Bench."""
@@ -142,8 +148,11 @@ def blind_scores(questions: Sequence[Question]) -> dict[str, tuple[int, float, f
     for question in questions:
         by_kind[question.kind].append(question)
     scores = {}
-    for kind in (k.name for k in KINDS if k.name in by_kind):
-        of_kind = by_kind[kind]
+    order = [kind.name for kind in KINDS]
+    # Pairs come after the kinds of single questions.
+    for kind, of_kind in sorted(
+        by_kind.items(), key=lambda row: order.index(row[0]) if row[0] in order else len(order)
+    ):
         if of_kind[0].options:
             counts = Counter(q.ground_truth for q in of_kind), Counter(q.answer for q in of_kind)
             best = max(count.most_common(1)[0][1] for count in counts) / len(of_kind)

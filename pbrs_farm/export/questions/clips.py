@@ -9,6 +9,7 @@ from collections import Counter, defaultdict
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, field
 from functools import cache, cached_property
+from itertools import groupby
 from pathlib import Path
 from typing import Any, Final
 
@@ -173,6 +174,17 @@ class Clip:
                 for x, y, z in eyes
             )
         ]
+
+    def visits_of(self, room: Room, least_frames: int) -> int:
+        """Number of stays of the camera in a room; 0 if a stay or an absence is shorter than least_frames."""
+        polygon = shapely.Polygon(room.polygon)
+        is_in = [
+            bool(room.floor_y <= y <= room.ceiling_y and polygon.contains(shapely.Point(x, z)))
+            for x, y, z in (pose_opencv(view)[:3, 3] for view in self.views)
+        ]
+        runs = [(inside, len(list(run))) for inside, run in groupby(is_in)]
+        is_clear = all(n_frames >= least_frames for _inside, n_frames in runs)
+        return sum(inside for inside, _n in runs) if is_clear else 0
 
     def stands_on_floor(self, thing: Thing) -> bool:
         """True if the item is on the floor of its room and large enough to be a destination."""

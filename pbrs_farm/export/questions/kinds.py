@@ -8,6 +8,7 @@ answers that do not depend on small distances.
 from __future__ import annotations
 
 import random
+from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise, permutations
@@ -62,7 +63,7 @@ class QuestionKind:
     answers: tuple[str, ...] = ()
 
 
-def _tried(
+def choices_of_things(
     rng: random.Random, things: Sequence[Thing], n: int, most: int = _MOST_TRIED
 ) -> Iterator[tuple[Thing, ...]]:
     """Distinct ordered choices of n items, in random order."""
@@ -91,7 +92,7 @@ def _counts(clip: Clip, _rng: random.Random) -> Iterator[Draft]:
 
 def _distances(clip: Clip, rng: random.Random) -> Iterator[Draft]:
     """Gap between two items, metres."""
-    for a, b in _tried(rng, clip.single, 2):
+    for a, b in choices_of_things(rng, clip.single, 2):
         gap = clip.gap_m(a, b)
         if gap >= _LEAST_GAP_M:
             words = {"a": a.noun, "b": b.noun}
@@ -114,18 +115,32 @@ def _room_sizes(clip: Clip, _rng: random.Random) -> Iterator[Draft]:
         yield Draft({}, f"{area:.1f}", (), ())
 
 
+def _visits(clip: Clip, _rng: random.Random) -> Iterator[Draft]:
+    """Number of times that the camera is in a room, which it may have left and entered again."""
+    names = Counter(room.name for room in clip.house.rooms)
+    for room in clip.rooms_entered:
+        visits = clip.visits_of(room, _LATER_FRAMES)
+        if visits and room.name and names[room.name] == 1:
+            yield Draft({"room": room.name.lower()}, str(visits), (), ())
+
+
 def _nearest(clip: Clip, rng: random.Random) -> Iterator[Draft]:
     """The nearest of four items to a fifth."""
-    for target, *candidates in _tried(rng, clip.single, 5):
+    for target, *candidates in choices_of_things(rng, clip.single, 5):
         gaps = sorted((clip.gap_m(target, candidate), candidate.noun) for candidate in candidates)
         nearest, second = gaps[0][0], gaps[1][0]
-        if second >= max(_CLEARLY * nearest, nearest + _CLEARLY_M):
+        if is_clearly_nearer(nearest, second):
             yield Draft(
                 {"a": target.noun},
                 gaps[0][1],
                 tuple(candidate.noun for candidate in candidates),
                 (target.instance, *(candidate.instance for candidate in candidates)),
             )
+
+
+def is_clearly_nearer(nearest_m: float, second_m: float) -> bool:
+    """True if the second distance is larger by a ratio and a length that anybody sees."""
+    return second_m >= max(_CLEARLY * nearest_m, nearest_m + _CLEARLY_M)
 
 
 def bearing_deg(stand: F64, face: F64, to: F64) -> float:
@@ -162,28 +177,36 @@ def _quadrant(bearing: float, margin_deg: float) -> str:
 def _directions(
     answer_of: Callable[[float, float], str], options: tuple[str, ...]
 ) -> Callable[[Clip, random.Random], Iterator[Draft]]:
-    """Direction of a third item, for a person next to the first who faces the second.
-
-    The answer holds at the first item's centre, by a margin, and at each of its corners.
-    """
+    """Direction of a third item, for a person next to the first who faces the second."""
 
     def drafts(clip: Clip, rng: random.Random) -> Iterator[Draft]:
-        for a, b, c in _tried(rng, clip.single, 3):
-            distances = [
-                float(np.linalg.norm(x.middle - y.middle)) for x, y in ((a, b), (a, c), (b, c))
-            ]
-            is_crowded = a.plan.intersects(b.plan) or a.plan.intersects(c.plan)
-            if min(distances) < _STEP_APART_M or is_crowded or not clip.stands_on_floor(a):
-                continue
-            answer = answer_of(bearing_deg(a.middle, b.middle, c.middle), _MARGIN_DEG)
-            if answer and all(
-                answer_of(bearing_deg(corner, b.middle, c.middle), 0) == answer
-                for corner in shapely.get_coordinates(a.plan)
-            ):
+        for a, b, c in choices_of_things(rng, clip.single, 3):
+            answer = side_of(clip, (a, b, c), answer_of)
+            if answer:
                 words = {"a": a.noun, "b": b.noun, "c": c.noun}
                 yield Draft(words, answer, options, (a.instance, b.instance, c.instance))
 
     return drafts
+
+
+def side_of(
+    clip: Clip, things: Sequence[Thing], answer_of: Callable[[float, float], str] = _left_or_right
+) -> str:
+    """Direction of the third item, for a person next to the first who faces the second; "" if unclear.
+
+    The answer holds at the first item's centre, by a margin, and at each of its corners.
+    """
+    a, b, c = things
+    distances = [float(np.linalg.norm(x.middle - y.middle)) for x, y in ((a, b), (a, c), (b, c))]
+    is_crowded = a.plan.intersects(b.plan) or a.plan.intersects(c.plan)
+    if min(distances) < _STEP_APART_M or is_crowded or not clip.stands_on_floor(a):
+        return ""
+    answer = answer_of(bearing_deg(a.middle, b.middle, c.middle), _MARGIN_DEG)
+    corners = shapely.get_coordinates(a.plan)
+    is_same = all(
+        answer_of(bearing_deg(corner, b.middle, c.middle), 0) == answer for corner in corners
+    )
+    return answer if is_same else ""
 
 
 def _turn(before: Thing, at: Thing, after: Thing) -> str:
@@ -201,7 +224,7 @@ def _routes(clip: Clip, rng: random.Random) -> Iterator[Draft]:
     turns = ("turn left", "turn right", "turn back")
     places = [thing for thing in clip.single if clip.stands_on_floor(thing)]
     for n in (3, 4):
-        for stops in _tried(rng, places, n, _MOST_WAYS):
+        for stops in choices_of_things(rng, places, n, _MOST_WAYS):
             taken = [_turn(*stops[k : k + 3]) for k in range(n - 2)]
             if not all(taken) or not all(
                 clip.is_way_free(stops[k], stops[k + 1]) for k in range(n - 1)
@@ -230,7 +253,7 @@ def _four_of(rng: random.Random, answer: str, turns: tuple[str, ...]) -> list[st
 
 def _orders(clip: Clip, rng: random.Random) -> Iterator[Draft]:
     """Order of the first appearance of four items."""
-    for chosen in _tried(rng, clip.single, 4):
+    for chosen in choices_of_things(rng, clip.single, 4):
         by_time = sorted(chosen, key=lambda t: t.first_seen or 0)
         if any(
             later.first_glimpsed < (earlier.first_seen or 0) + _LATER_FRAMES
@@ -283,6 +306,14 @@ KINDS: Final = (
             "What floor area do the rooms that the camera enters have together, in square metres?",
             "How many square metres of floor are in the rooms that the camera walks through, all taken"
             " together?",
+        ),
+        of_walks_only=True,
+    ),
+    QuestionKind(
+        "room_visits", _visits,
+        (
+            "How many separate times is the camera in the {room}? It may leave and come back.",
+            "Count the stays of the camera in the {room}: how many are there, from the first to the last?",
         ),
         of_walks_only=True,
     ),

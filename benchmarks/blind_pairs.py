@@ -1,0 +1,91 @@
+"""The score of a blind model on minimal pairs: words and colours of pictures, no geometry; part of `make bench NAME=sets`.
+
+Ridge regression chooses one of the two options by their words, and by the colours of a coarse picture for each kind of
+answer ("cannot be told", "left", ...). It is judged on homes that it was not fitted to.
+"""
+
+from __future__ import annotations
+
+import json
+import zlib
+from pathlib import Path
+from typing import Any, Final
+
+import numpy as np
+from numpy.typing import NDArray
+
+from pbrs_farm.images import array_from_png
+
+UNITS: Final = {
+    "questions.pairs": "minimal pairs about pictures",
+    "questions.blind_pairs": "share of right answers of a model of the words, and of one of words and coarse colours; chance is 0.5",
+    "questions.blind_pairs_se": "standard error of the second",
+}
+_N_WORDS: Final = 256  # hashed words
+_CELLS: Final = 4  # of the coarse picture, along each side
+_RIDGE: Final = 10.0
+_ANSWERS: Final = ("cannot be told", "left", "right", "yes", "no")
+
+
+def blind_figures(exports: list[Path]) -> dict[str, Any]:
+    """The figures of UNITS, of folders that `pbrs-farm export --to questions` wrote."""
+    rows = [
+        row | {"picture": folder / row["media"]}
+        for folder in exports
+        for row in map(json.loads, (folder / "questions.jsonl").read_text("utf-8").splitlines())
+        if "pair" in row
+    ]
+    by_words, _ = _score(rows, with_colours=False)
+    by_all, error = _score(rows, with_colours=True)
+    return {
+        "questions.pairs": len(rows) // 2,
+        "questions.blind_pairs": {"words": round(by_words, 3), "colours": round(by_all, 3)},
+        "questions.blind_pairs_se": round(error, 3),
+    }
+
+
+def _score(rows: list[dict[str, Any]], *, with_colours: bool) -> tuple[float, float]:
+    """Mean score on left-out homes, and its standard error over pairs."""
+    features = np.stack([_features(row, with_colours=with_colours) for row in rows])
+    signs = np.array([1.0 if row["ground_truth"] == "A" else -1.0 for row in rows])
+    homes = np.array([row["scene_name"].partition("__")[0] for row in rows])
+    is_right = np.zeros(len(rows))
+    for home in np.unique(homes):
+        train, test = homes != home, homes == home
+        x = features[train]
+        # The dual form: fewer questions than features.
+        weights = x.T @ np.linalg.solve(x @ x.T + _RIDGE * np.eye(len(x)), signs[train])
+        guess = features[test] @ weights
+        # Of no preference, half is right.
+        is_right[test] = np.where(guess == 0, 0.5, np.sign(guess) == signs[test])
+    of_pairs = is_right.reshape(-1, 2).mean(1)
+    return float(of_pairs.mean()), float(of_pairs.std() / np.sqrt(max(len(of_pairs), 1)))
+
+
+def _features(row: dict[str, Any], *, with_colours: bool) -> NDArray[np.float64]:
+    """What speaks for the first option and against the second."""
+    one, two = (option[3:] for option in row["options"])
+    words = _words(f"{row['question_type']} {row['question']}", one) - _words(
+        f"{row['question_type']} {row['question']}", two
+    )
+    if not with_colours:
+        return words
+    colours = _colours(row["picture"])
+    kinds = np.array([float(one == a) - float(two == a) for a in _ANSWERS])
+    return np.concatenate([words, np.outer(kinds, colours).ravel()])
+
+
+def _words(question: str, option: str) -> NDArray[np.float64]:
+    """Hashed words of an option, alone and with each word of the question."""
+    vector = np.zeros(_N_WORDS)
+    for word in ["", *question.lower().split()]:
+        vector[zlib.crc32(f"{word} {option}".encode()) % _N_WORDS] += 1 if not word else 0.2
+    return vector
+
+
+def _colours(file: Path) -> NDArray[np.float64]:
+    """Mean colours of the cells of a picture, and its overall mean and deviation, about -1 to 1."""
+    rgb = array_from_png(file.read_bytes(), str(file))[..., :3] / 127.5 - 1
+    rows = np.array_split(rgb, _CELLS, axis=0)
+    cells = [cell.mean((0, 1)) for row in rows for cell in np.array_split(row, _CELLS, axis=1)]
+    return np.concatenate([np.ravel(cells), rgb.mean((0, 1)), rgb.std((0, 1)), [1.0]])
