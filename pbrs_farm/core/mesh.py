@@ -38,6 +38,11 @@ def lengths(vectors: F64) -> F64:
     return np.asarray(np.sqrt(x * x + y * y + z * z))
 
 
+def unit_vectors(vectors: F64) -> F64:
+    """Vectors (..., 3) at length 1, zero where they are (almost) zero; to the bit as by numpy's norm."""
+    return np.asarray(vectors / np.maximum(lengths(vectors), 1e-12)[..., None])
+
+
 def dots(a: F64, b: F64) -> F64:
     """(...,) dot products of vectors (..., 3), to the bit as numpy's sum, in a third of its time."""
     return np.asarray(a[..., 0] * b[..., 0] + a[..., 1] * b[..., 1] + a[..., 2] * b[..., 2])

@@ -13,6 +13,7 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.mesh import unit_vectors
 
 # Rows of each face: its right, down and forward in the camera's axes (OpenCV's).
 FACE_AXES: Final[F64] = np.array(
@@ -55,8 +56,7 @@ def directions_of_cubemap(plane: F64) -> F64:
     axes = FACE_AXES[np.where(inside, number, 0).astype(np.int64)]
     # The point of the face at unit depth, in the camera's axes.
     right = (plane[:, 0] - 2 * number)[:, None] * axes[:, 0]
-    point = right + plane[:, 1:] * axes[:, 1] + axes[:, 2]
-    point /= np.linalg.norm(point, axis=1, keepdims=True)
+    point = unit_vectors(right + plane[:, 1:] * axes[:, 1] + axes[:, 2])
     return np.where(inside[:, None], point, np.nan)
 
 

@@ -16,6 +16,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece, Shape
 from pbrs_farm.core.frames import affine, rotation_y
 from pbrs_farm.core.house import Box, House, Item, LightPart, Material, Note, Surface, Texture
+from pbrs_farm.core.mesh import unit_vectors
 from pbrs_farm.dress.painted_bank import PaintedBank
 from pbrs_farm.dress.painted_materials import PaintedMaterials
 
@@ -169,8 +170,7 @@ class MutableHouse:
         normals = surface.normals
         if normals is not None:
             # The inverse transpose keeps normals at right angles to stretched faces, not their length.
-            n = normals.astype(np.float64) @ normal_matrix.T
-            n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-12)
+            n = unit_vectors(normals.astype(np.float64) @ normal_matrix.T)
             normals = n.astype(np.float32)
         return replace(surface, positions=positions, normals=normals, material=number)
 

@@ -15,7 +15,7 @@ import numpy as np
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.house import corners_of_surfaces
-from pbrs_farm.core.mesh import lengths, unit_normals
+from pbrs_farm.core.mesh import unit_normals, unit_vectors
 from pbrs_farm.export.home_files import z_up_points
 from pbrs_farm.export.home_pieces import ExportedHome, Piece
 from pbrs_farm.geometry.surface_points import spread_points
@@ -58,10 +58,9 @@ def antipodal_pairs(triangles: F64, seed: int, *, most: int = _MOST) -> Grasps:
     normals = unit_normals(triangles)
     along = normals[which[drawn]]
     # Tilt every other line within the cone of friction, for tapered items.
-    aside = np.cross(along, rng.normal(size=along.shape))
-    aside /= np.maximum(lengths(aside), 1e-12)[:, None]
-    along = along + (np.arange(len(along)) % 2 * FRICTION * rng.random(len(along)))[:, None] * aside
-    along /= lengths(along)[:, None]
+    aside = unit_vectors(np.cross(along, rng.normal(size=along.shape)))
+    tilt = np.arange(len(along)) % 2 * FRICTION * rng.random(len(along))
+    along = unit_vectors(along + tilt[:, None] * aside)
     ways, faces = _outermost(points[drawn], along, triangles)
     width = ways[:, 1] - ways[:, 0]
     cosine = (normals[faces] * along[:, None]).sum(2)

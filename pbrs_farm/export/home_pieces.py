@@ -21,6 +21,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import House, Item, ItemKind, LightPart, Material, Room, Surface
 from pbrs_farm.core.lighting import LightForm, flux_lm
+from pbrs_farm.core.mesh import unit_vectors
 from pbrs_farm.core.record import Record
 from pbrs_farm.export.home_bodies import Body, bodies_of, box_inertia
 from pbrs_farm.geometry.heights import highest_below
@@ -267,8 +268,7 @@ def _surface_in_frame(surface: Surface, b_from_a: F64) -> Surface:
     normals = surface.normals
     if normals is not None:
         turned = normals.astype(np.float64) @ b_from_a[:3, :3].T
-        length = np.maximum(np.linalg.norm(turned, axis=1, keepdims=True), 1e-12)
-        normals = (turned / length).astype(np.float32)
+        normals = unit_vectors(turned).astype(np.float32)
     return replace(surface, positions=positions, normals=normals)
 
 

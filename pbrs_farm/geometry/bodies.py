@@ -13,7 +13,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, I32, Bools
 from pbrs_farm.core.house import Surface
-from pbrs_farm.core.mesh import area_vectors, cross_products, lengths
+from pbrs_farm.core.mesh import area_vectors, cross_products, lengths, unit_vectors
 from pbrs_farm.geometry import solids
 from pbrs_farm.geometry.outlines import Outline, Profile, Triple, oval, rect
 
@@ -263,10 +263,8 @@ def disc(
 def tube(path: Sequence[Triple], r: float, *, n: int = 8, end: float | None = None) -> Surface:
     """A round bar along a path, closed at both ends; end: its radius there where it tapers."""
     points = np.asarray(path, np.float64)
-    step = np.diff(points, axis=0)
-    step /= np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-12)
-    along = np.concatenate([step[:1], step[:-1] + step[1:], step[-1:]])
-    along /= np.maximum(np.linalg.norm(along, axis=1, keepdims=True), 1e-12)
+    step = unit_vectors(np.diff(points, axis=0))
+    along = unit_vectors(np.concatenate([step[:1], step[:-1] + step[1:], step[-1:]]))
     # Carry one direction across along the path, so that the tube does not twist.
     aside = (0.0, 1.0, 0.0) if abs(along[0, 1]) < 0.9 else (1.0, 0.0, 0.0)
     side = cross_products(along[0], np.array(aside))
@@ -303,8 +301,7 @@ def tube(path: Sequence[Triple], r: float, *, n: int = 8, end: float | None = No
 def hoop(outline: Outline, y: float, r: float, *, n: int = 6) -> Surface:
     """A closed ring of round section along an outline at a height."""
     path = np.array([(x, y, z) for x, z in outline], np.float64)
-    step = np.roll(path, -1, 0) - np.roll(path, 1, 0)
-    step /= np.maximum(np.linalg.norm(step, axis=1, keepdims=True), 1e-12)
+    step = unit_vectors(np.roll(path, -1, 0) - np.roll(path, 1, 0))
     out = np.cross(step, (0.0, 1.0, 0.0))
     t = 2 * np.pi * np.arange(n) / n
     rings = path[:, None] + r * (
@@ -337,8 +334,7 @@ def stretched(surface: Surface, size: tuple[float, float, float]) -> Surface:
     """A body stretched along the axes."""
     scale = np.asarray(size)
     # Normals scale by the inverse, so that they stay at right angles to the surface.
-    normals = np.asarray(surface.normals, np.float64) / scale
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    normals = unit_vectors(np.asarray(surface.normals, np.float64) / scale)
     points = (surface.positions.astype(np.float64) * scale).astype(np.float32)
     return Surface(surface.name, points, surface.faces, 0, None, normals.astype(np.float32))
 
@@ -358,7 +354,7 @@ def smooth(name: str, points: F64, faces: I32) -> Surface:
     normals = np.zeros_like(points)
     for k in range(3):
         np.add.at(normals, faces[:, k], n)
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    normals = unit_vectors(normals)
     return Surface(
         name, points.astype(np.float32), faces.astype(np.int32), 0, None, normals.astype(np.float32)
     )
@@ -385,7 +381,7 @@ def creased(name: str, points: F64, faces: I32, sharp_rad: float) -> Surface:
     normals = np.zeros((len(vertex), 3))
     for k in range(3):
         normals[:, k] = np.bincount(a[soft], area[b[soft] // 3, k], len(vertex))
-    normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
+    normals = unit_vectors(normals)
     # One vertex for each place and normal: one number for both, in the order of rows.
     key = vertex
     for column in np.rint(normals * 1e4).astype(np.int64).T:

@@ -13,7 +13,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, I32, Points2
 from pbrs_farm.core.house import Surface
-from pbrs_farm.core.mesh import cross_products, lengths
+from pbrs_farm.core.mesh import cross_products, unit_vectors
 
 Triple = tuple[float, float, float]
 
@@ -37,11 +37,9 @@ def quads_surface(name: str, quads: F64, material: int) -> Surface:
     """A surface of planar quads (N, 4, 3), counter-clockwise from outside, uv in metres from corner 0."""
     quads = np.asarray(quads, np.float64).reshape(-1, 4, 3)
     # Lay u along the first edge, v at right angles to it in the quad's plane.
-    u = quads[:, 1] - quads[:, 0]
-    u = u / np.maximum(lengths(u)[:, None], 1e-12)
+    u = unit_vectors(quads[:, 1] - quads[:, 0])
     normal = cross_products(u, quads[:, 3] - quads[:, 0])
-    v = cross_products(normal, u)
-    v = v / np.maximum(lengths(v)[:, None], 1e-12)
+    v = unit_vectors(cross_products(normal, u))
     local = quads - quads[:, :1]
     uvs = np.empty((len(quads), 4, 2))
     for k, axis in enumerate((u, v)):
@@ -87,8 +85,7 @@ def lathe(name: str, profile: F64, centre: F64, material: int, *, n: int = 16) -
     for k, ((r0, y0), (r1, y1)) in enumerate(pairwise(profile)):
         ring = [around * r + [0, y, 0] + centre for r, y in ((r0, y0), (r1, y1))]
         # Stand the normal on the stretch.
-        slope = around * (y1 - y0) + np.array([0, r0 - r1, 0])
-        slope = slope / np.maximum(np.linalg.norm(slope, axis=1, keepdims=True), 1e-12)
+        slope = unit_vectors(around * (y1 - y0) + np.array([0, r0 - r1, 0]))
         base = k * 2 * (n + 1)
         i = np.arange(n) + base
         j = i + n + 1

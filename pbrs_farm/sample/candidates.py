@@ -14,6 +14,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64, I32
 from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.mesh import unit_vectors
 from pbrs_farm.core.recipe import CameraFields
 
 
@@ -53,9 +54,8 @@ def cameras_looking(
 ) -> list[Camera]:
     """Camera.look for many: eyes, towards (N, 3), neither parallel to up; roll: (N,) radians clockwise."""
     # Build OpenGL axes: x right, y up, z back.
-    back = -towards / np.linalg.norm(towards, axis=1, keepdims=True)
-    right = np.cross(np.array(up), back)
-    right /= np.linalg.norm(right, axis=1, keepdims=True)
+    back = -unit_vectors(towards)
+    right = unit_vectors(np.cross(np.array(up), back))
     above = np.cross(back, right)
     if roll is not None and roll.any():
         cos, sin = np.cos(roll)[:, None], np.sin(roll)[:, None]

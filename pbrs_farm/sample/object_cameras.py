@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.camera import Camera, Intrinsics, View
+from pbrs_farm.core.mesh import unit_vectors
 
 N_VIEWS: Final = 20  # per object, paper section 4.1
 MIN_DIAGONALS, MAX_DIAGONALS = 1.5, 4.5  # from the box's middle to the eye
@@ -61,8 +62,7 @@ def icosphere_vertices(n_subdivisions: int) -> F64:
         # Make one middle per edge, on the sphere, and four faces of each.
         edges = np.sort(faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2), axis=1)
         unique, place = np.unique(edges, axis=0, return_inverse=True)
-        middles = vertices[unique].sum(1)
-        middles /= np.linalg.norm(middles, axis=1, keepdims=True)
+        middles = unit_vectors(vertices[unique].sum(1))
         a, b, c = (len(vertices) + place.reshape(-1, 3)).T
         i, j, k = faces.T
         vertices = np.concatenate([vertices, middles])

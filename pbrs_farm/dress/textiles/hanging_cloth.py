@@ -8,6 +8,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Surface
+from pbrs_farm.core.mesh import unit_vectors
 from pbrs_farm.geometry.solids import lathe
 
 _THICK_M = 0.003
@@ -53,8 +54,7 @@ def solid_sheet(name: str, middle: F64, uv: F64, thick_m: float = _THICK_M) -> S
     """A closed body around a sheet of points (R, C, 3), its front towards +z where it is flat."""
     rows, columns = middle.shape[:2]
     across, up = np.gradient(middle, axis=1), np.gradient(middle, axis=0)
-    normal = np.cross(across, up)
-    normal = normal / np.maximum(np.linalg.norm(normal, axis=-1, keepdims=True), 1e-12)
+    normal = unit_vectors(np.cross(across, up))
     front, back = middle + normal * thick_m / 2, middle - normal * thick_m / 2
     n = rows * columns
     index = np.arange(n).reshape(rows, columns)
@@ -73,7 +73,7 @@ def solid_sheet(name: str, middle: F64, uv: F64, thick_m: float = _THICK_M) -> S
     outward = np.cross(
         front.reshape(-1, 3)[after] - front.reshape(-1, 3)[rim], normal.reshape(-1, 3)[rim]
     )
-    outward = outward / np.maximum(np.linalg.norm(outward, axis=1, keepdims=True), 1e-12)
+    outward = unit_vectors(outward)
     positions = np.concatenate([front.reshape(-1, 3), back.reshape(-1, 3), rim_points])
     normals = np.concatenate([normal.reshape(-1, 3), -normal.reshape(-1, 3), outward, outward])
     flat_uv = uv.reshape(-1, 2)

@@ -16,7 +16,13 @@ import numpy as np
 from pbrs_farm.core.arrays import F64, I64, Bools
 from pbrs_farm.core.classes import CEILING, FLOOR, WALL
 from pbrs_farm.core.house import Item, ItemKind, Surface, corners_of_surfaces, part_of
-from pbrs_farm.core.mesh import area_vectors, closed_edge_share, face_areas, signed_volume
+from pbrs_farm.core.mesh import (
+    area_vectors,
+    closed_edge_share,
+    face_areas,
+    signed_volume,
+    unit_vectors,
+)
 from pbrs_farm.geometry.connected import connected_faces
 
 MAX_PLANES: Final = 200  # A wall of more planes is sculpted, not built of sheets, and stays whole
@@ -65,8 +71,7 @@ def _is_closed(surfaces: Sequence[Surface]) -> bool:
 def plane_of_faces(surfaces: Sequence[Surface]) -> I64:
     """(F,) plane index, to a degree and a centimetre, ignoring orientation, of all surfaces' faces in turn."""
     p = corners_of_surfaces(surfaces)
-    n = area_vectors(p)
-    n /= np.maximum(np.linalg.norm(n, axis=1, keepdims=True), 1e-12)
+    n = unit_vectors(area_vectors(p))
     # Make the two sides of a plane one: the leading component of its normal is positive.
     leading = np.abs(n).argmax(1)
     n *= np.sign(n[np.arange(len(n)), leading])[:, None]

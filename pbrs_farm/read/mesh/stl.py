@@ -9,7 +9,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.mesh import face_areas
+from pbrs_farm.core.mesh import face_areas, unit_vectors
 from pbrs_farm.read.mesh.obj import DEFAULT_CREASE_RAD, Mesh
 from pbrs_farm.read.mesh.shading_normals import crease_normals
 
@@ -31,8 +31,7 @@ def parse_stl(data: bytes, file: str, *, max_triangles: int) -> Mesh:
     normals, of_corner = crease_normals(points, faces, DEFAULT_CREASE_RAD)
     keys = np.stack([faces.reshape(-1), of_corner.reshape(-1)], 1)
     unique, corner = np.unique(keys, axis=0, return_inverse=True)
-    normal = normals[unique[:, 1]]
-    normal = normal / np.maximum(np.linalg.norm(normal, axis=1, keepdims=True), 1e-12)
+    normal = unit_vectors(normals[unique[:, 1]])
     return Mesh("", "", points[unique[:, 0]], corner.reshape(-1, 3).astype(np.int32), None, normal)
 
 

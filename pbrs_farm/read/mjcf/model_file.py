@@ -18,6 +18,7 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import Y_UP_FROM_Z_UP, affine
 from pbrs_farm.core.house import House, Source
 from pbrs_farm.core.joints import JointKind
+from pbrs_farm.core.mesh import unit_vectors
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import GlbWriter, Gltf
 from pbrs_farm.home.room_use import named_kind
@@ -306,10 +307,7 @@ class _Scene:
         add = self._writer.add_vertices
         attributes = {"POSITION": add(shape.positions.astype(np.float32), with_bounds=True)}
         if shape.normals is not None:
-            length = np.linalg.norm(shape.normals, axis=1, keepdims=True)
-            attributes["NORMAL"] = add(
-                (shape.normals / np.maximum(length, 1e-12)).astype(np.float32)
-            )
+            attributes["NORMAL"] = add(unit_vectors(shape.normals).astype(np.float32))
         if shape.uvs is not None:
             attributes["TEXCOORD_0"] = add(shape.uvs.astype(np.float32))
         row = {

@@ -19,6 +19,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Box, House, Item, ItemKind, Level, MaterialKind, Source, Surface
+from pbrs_farm.core.mesh import unit_vectors
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.material_library import MaterialLibrary
 from pbrs_farm.read.common.model_cache import ModelCache
@@ -191,7 +192,7 @@ def _centred(surfaces: list[Surface], size_m: tuple[float, float, float] | None)
 def _move_and_scale(surface: Surface, origin: F64, scale: F64) -> Surface:
     normals = surface.normals
     if normals is not None:
-        turned = normals / scale  # by the inverse transpose
-        normals = (turned / np.linalg.norm(turned, axis=1, keepdims=True)).astype(np.float32)
+        # By the inverse transpose.
+        normals = unit_vectors(normals / scale).astype(np.float32)
     positions = ((surface.positions - origin) * scale).astype(np.float32)
     return replace(surface, positions=positions, normals=normals)

@@ -14,6 +14,7 @@ from pbrs_farm.core.classes import LAMP
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import is_flattening
 from pbrs_farm.core.house import MAX_INSTANCES, ItemKind
+from pbrs_farm.core.mesh import unit_vectors
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import GlbWriter, Gltf
 from pbrs_farm.formats.house_glb import V_DOWN
@@ -255,9 +256,7 @@ class StageNodes:
         add = self._writer.add_vertices
         attributes = {"POSITION": add(shape.positions.astype(np.float32), with_bounds=True)}
         if shape.normals is not None:
-            length = np.linalg.norm(shape.normals, axis=1, keepdims=True)
-            normals = shape.normals / np.maximum(length, 1e-12)
-            attributes["NORMAL"] = add(normals.astype(np.float32))
+            attributes["NORMAL"] = add(unit_vectors(shape.normals).astype(np.float32))
         if shape.uvs is not None:
             down = shape.uvs.astype(np.float32) * V_DOWN + np.array([0, 1], np.float32)
             attributes["TEXCOORD_0"] = add(down)

@@ -20,7 +20,7 @@ from pbrs_farm.core.house import (
     Surface,
     corners_of_surfaces,
 )
-from pbrs_farm.core.mesh import area_vectors, distances_to_triangles
+from pbrs_farm.core.mesh import area_vectors, distances_to_triangles, unit_vectors
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.repair.repair_report import SourceRepair
 
@@ -145,7 +145,7 @@ def icosphere(
     points = [(s, t * g, 0.0) for s in (-1.0, 1.0) for t in (-1.0, 1.0)]
     points += [(0.0, x, y) for x, y, _ in points[:4]]
     points += [(y, 0.0, x) for x, y, _ in points[:4]]
-    unit = np.array(points) / np.linalg.norm(points, axis=1, keepdims=True)
+    unit = unit_vectors(np.array(points))
     near = np.linalg.norm(unit[:, None] - unit[None], axis=2) < 1.2  # an edge is 1.05 long
     faces = np.array(
         [
@@ -175,8 +175,7 @@ def _split_parts(unit: F64, faces: I64) -> tuple[F64, I64]:
     # Make one middle vertex for the two faces of an edge, on the sphere.
     edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
     pairs, inverse = np.unique(edges, axis=0, return_inverse=True)
-    middle = unit[pairs].mean(1)
-    middle /= np.linalg.norm(middle, axis=1, keepdims=True)
+    middle = unit_vectors(unit[pairs].mean(1))
     ab, bc, ca = np.ravel(inverse).reshape(3, -1) + len(unit)
     # Put four faces in the place of each.
     a, b, c = faces.T

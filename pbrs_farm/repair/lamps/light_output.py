@@ -14,7 +14,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.house import House, Item, MaterialKind, Surface, corners_of_surfaces
-from pbrs_farm.core.mesh import clipped_to_box, face_areas, unit_normals
+from pbrs_farm.core.mesh import clipped_to_box, face_areas, unit_normals, unit_vectors
 from pbrs_farm.repair.measure.leaks import Occluder
 from pbrs_farm.repair.structure.closed_shells import components, patch_from_surface
 
@@ -189,9 +189,5 @@ def diffuse_rays(surfaces: Sequence[Surface], n: int, rng: np.random.Generator) 
 
 def _cosine_directions(normals: F64, rng: np.random.Generator) -> F64:
     """Unit directions about normals (N, 3) by the cosine: points of a unit sphere on the face."""
-    sphere = rng.normal(size=normals.shape)
-    sphere /= np.maximum(np.linalg.norm(sphere, axis=1, keepdims=True), 1e-12)
-    directions = sphere + normals
-    return np.asarray(
-        directions / np.maximum(np.linalg.norm(directions, axis=1, keepdims=True), 1e-12)
-    )
+    sphere = unit_vectors(rng.normal(size=normals.shape))
+    return unit_vectors(sphere + normals)

@@ -15,7 +15,7 @@ import shapely
 
 from pbrs_farm.core.arrays import F32, F64, I32
 from pbrs_farm.core.house import House, Item, ItemKind, Surface, geometry_from_house
-from pbrs_farm.core.mesh import dots, lengths, triangle_corners, unit_normals
+from pbrs_farm.core.mesh import dots, triangle_corners, unit_normals, unit_vectors
 from pbrs_farm.repair.measure.enclosure import Space
 from pbrs_farm.repair.measure.room_interiors import RoomInterior
 from pbrs_farm.repair.repair_report import Leak, LeakReport, SpaceLeaks
@@ -104,7 +104,7 @@ def _rays(
     origins = np.concatenate(
         [np.repeat(edges, meter.per_start, 0), np.repeat(inside, meter.per_inside, 0)]
     )
-    return origins, _unit(rng.normal(size=origins.shape))
+    return origins, unit_vectors(rng.normal(size=origins.shape))
 
 
 def _edge_starts(interior: RoomInterior, step_m: float, rng: np.random.Generator) -> F64:
@@ -201,7 +201,7 @@ def _measure_space(
         front, n = hits[is_front], n[is_front]
         reached = p[front] + towards[is_front] * distance[front, None].astype(np.float64)
         # Bounce diffusely: a point on a unit sphere that touches the face.
-        d = _unit(_unit(rng.normal(size=n.shape)) + n)
+        d = unit_vectors(unit_vectors(rng.normal(size=n.shape)) + n)
         p = reached + 1e-4 * n
     return SpaceLeaks(
         rooms=space.rooms,
@@ -210,10 +210,6 @@ def _measure_space(
         n_sky=n_sky,
         leaks=tuple(leaks[:_MAX_LEAKS]),
     )
-
-
-def _unit(v: F64) -> F64:
-    return np.asarray(v / np.maximum(lengths(v), 1e-12)[:, None])
 
 
 def _triple(v: F64) -> tuple[float, float, float]:

@@ -11,7 +11,7 @@ from manifold3d import Manifold
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, ItemKind
-from pbrs_farm.core.mesh import unit_normals
+from pbrs_farm.core.mesh import unit_normals, unit_vectors
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import (
     Patch,
@@ -55,8 +55,7 @@ def with_metric_uv(patch: Patch) -> Patch:
     corners = patch.positions[patch.faces]
     normals = unit_normals(corners)
     up = np.where(np.abs(normals[:, 1:2]) < 0.7, [[0.0, 1.0, 0.0]], [[0.0, 0.0, 1.0]])
-    u = np.cross(up, normals)
-    u = u / np.maximum(np.linalg.norm(u, axis=1, keepdims=True), 1e-12)
+    u = unit_vectors(np.cross(up, normals))
     v = np.cross(normals, u)
     uvs = np.stack([np.einsum("fki,fi->fk", corners, axis) for axis in (u, v)], -1)
     # Give each face separate vertices: neighbours have other axes.
