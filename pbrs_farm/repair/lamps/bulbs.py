@@ -10,7 +10,7 @@ from dataclasses import replace
 
 import numpy as np
 
-from pbrs_farm.core.arrays import F64, I64, triple
+from pbrs_farm.core.arrays import F64, triple
 from pbrs_farm.core.house import (
     House,
     Item,
@@ -22,6 +22,7 @@ from pbrs_farm.core.house import (
 )
 from pbrs_farm.core.mesh import area_vectors, distances_to_triangles, unit_vectors
 from pbrs_farm.core.recipe import RepairFields
+from pbrs_farm.geometry.icosphere import icosphere_mesh
 from pbrs_farm.repair.repair_report import SourceRepair
 
 _CLEARANCE = 0.97  # share of the free distance that a bulb's radius takes
@@ -145,20 +146,8 @@ def icosphere(
     points = [(s, t * g, 0.0) for s in (-1.0, 1.0) for t in (-1.0, 1.0)]
     points += [(0.0, x, y) for x, y, _ in points[:4]]
     points += [(y, 0.0, x) for x, y, _ in points[:4]]
-    unit = unit_vectors(np.array(points))
-    near = np.linalg.norm(unit[:, None] - unit[None], axis=2) < 1.2  # an edge is 1.05 long
-    faces = np.array(
-        [
-            (i, j, k)
-            for i in range(12)
-            for j in range(i + 1, 12)
-            for k in range(j + 1, 12)
-            if near[i, j] and near[j, k] and near[i, k]
-        ]
-    )
-    # Halve the edges, then turn inward faces round.
-    for _ in range(n_splits):
-        unit, faces = _split_parts(unit, faces)
+    unit, faces = icosphere_mesh(unit_vectors(np.array(points)), n_splits)
+    # Turn inward faces round.
     inward = (area_vectors(unit[faces]) * unit[faces[:, 0]]).sum(1) < 0
     faces = np.where(inward[:, None], faces[:, [0, 2, 1]], faces)
     return Surface(
@@ -169,18 +158,6 @@ def icosphere(
         None,
         unit.astype(np.float32),
     )
-
-
-def _split_parts(unit: F64, faces: I64) -> tuple[F64, I64]:
-    # Make one middle vertex for the two faces of an edge, on the sphere.
-    edges = np.sort(np.concatenate([faces[:, [0, 1]], faces[:, [1, 2]], faces[:, [2, 0]]]), axis=1)
-    pairs, inverse = np.unique(edges, axis=0, return_inverse=True)
-    middle = unit_vectors(unit[pairs].mean(1))
-    ab, bc, ca = np.ravel(inverse).reshape(3, -1) + len(unit)
-    # Put four faces in the place of each.
-    a, b, c = faces.T
-    parts = [(a, ab, ca), (ab, b, bc), (ca, bc, c), (ab, bc, ca)]
-    return np.concatenate([unit, middle]), np.concatenate([np.stack(p, 1) for p in parts])
 
 
 def _round_key(value: float) -> float:
