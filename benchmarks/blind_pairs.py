@@ -7,13 +7,17 @@ answer ("cannot be told", "left", ...). It is judged on homes that it was not fi
 from __future__ import annotations
 
 import json
+import random
 import zlib
+from collections import Counter
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
 
+import pbrs_farm as pf
+from pbrs_farm.core.edits import unedited_id
 from pbrs_farm.images import array_from_png
 
 UNITS: Final = {
@@ -25,6 +29,30 @@ _N_WORDS: Final = 256  # hashed words
 _CELLS: Final = 4  # of the coarse picture, along each side
 _RIDGE: Final = 10.0
 _ANSWERS: Final = ("cannot be told", "left", "right", "yes", "no")
+
+
+_HOMES: Final = ("builtin", "made:70101,rooms=1")
+_N_SWAPS: Final = 8  # edited versions of a home
+_N_CAMERAS: Final = 4
+
+
+def render_swaps(root: Path) -> None:
+    """Render homes, and versions of them in which two items have changed places, from the same cameras."""
+    for word in _HOMES:
+        home = pf.load(word, "preview")
+        cameras = [viewpoint.camera for viewpoint in home.cameras(n=_N_CAMERAS, size=(160, 120))]
+        frames = pf.render(home, cameras, modes=["opengl_dl"])
+        frames.save(root)
+        seen = Counter(row["item"] for f in frames for row in f.instances if row["pixels"] > 150)
+        items = {i.id: i for i in home.house.items if i.id in seen and not i.kind.is_structure}
+        ids = sorted(items, key=lambda name: (-seen[name], name))
+        rng = random.Random(word)
+        for _ in range(_N_SWAPS):
+            a, b = rng.sample(ids, 2)
+            by = items[b].bounds.mean(0) - items[a].bounds.mean(0)
+            by[1] = 0
+            swapped = home.move(a, by=tuple(by)).move(b, by=tuple(-by))
+            pf.render(swapped, cameras, modes=["opengl_dl"]).save(root)
 
 
 def blind_figures(exports: list[Path]) -> dict[str, Any]:
@@ -48,7 +76,7 @@ def _score(rows: list[dict[str, Any]], *, with_colours: bool) -> tuple[float, fl
     """Mean score on left-out homes, and its standard error over pairs."""
     features = np.stack([_features(row, with_colours=with_colours) for row in rows])
     signs = np.array([1.0 if row["ground_truth"] == "A" else -1.0 for row in rows])
-    homes = np.array([row["scene_name"].partition("__")[0] for row in rows])
+    homes = np.array([unedited_id(row["scene_name"].partition("__")[0]) for row in rows])
     is_right = np.zeros(len(rows))
     for home in np.unique(homes):
         train, test = homes != home, homes == home
