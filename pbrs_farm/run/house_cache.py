@@ -121,7 +121,9 @@ class CachedHouse:
         """The scene that carries light; loading Mitsuba, geometry and textures takes seconds."""
         from pbrs_farm.transport.light_scene import LightScene
 
-        return LightScene.load(self.house, self.textures, self.recipe, self.sky)
+        # The scene holds its own texels: do not keep these for it.
+        textures = self.__dict__.get("textures") or decoded_textures(self.house)[0]
+        return LightScene.load(self.house, textures, self.recipe, self.sky)
 
     def light_scene_at(self, time_s: float | None) -> LightScene:
         """The scene that carries light, of the house at a time; the same object for all times."""

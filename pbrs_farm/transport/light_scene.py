@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.errors import BadHouse, MachineFailed, RenderFailed
-from pbrs_farm.core.house import House
+from pbrs_farm.core.house import House, Material
 from pbrs_farm.core.lighting import Group
 from pbrs_farm.core.recipe import LightFields, Recipe
 from pbrs_farm.geometry.moving import MovingHouse
@@ -28,6 +28,7 @@ from pbrs_farm.transport.render_checkpoint import NoCheckpoint, RenderCheckpoint
 from pbrs_farm.transport.scene_tables.portals import panes_of_house, portals_of_house
 from pbrs_farm.transport.scene_tables.scene_tables import SceneTables, moved_rows, tables_from_house
 from pbrs_farm.transport.scene_tables.sky import Sky
+from pbrs_farm.transport.scene_tables.texture_atlas import map_key
 from pbrs_farm.transport.surface_noise import NoiseAnchors, Streams, surface_streams
 
 if TYPE_CHECKING:
@@ -54,6 +55,12 @@ class Pilot:
     camera: Camera
     seed: int  # of that view's light
     time_s: float | None = None  # of that view, in a home with motions
+
+
+def _materials_of(house: House) -> list[Material]:
+    """The materials that some item shows."""
+    shown = {s.material for item in house.items for s in item.surfaces}
+    return [house.materials[k] for k in sorted(shown)]
 
 
 class LightScene:
@@ -86,6 +93,8 @@ class LightScene:
             # OptiX takes one scene in a kernel: there panes mirror nothing.
             if panes is not None and variant.startswith("llvm"):
                 self.device_scene.panes = Panes(panes)
+            # The device has the texels, most of the tables' bytes.
+            self.tables = replace(tables, texels=tables.texels[:1].copy())
         self._portals = portals
         self._moving = moving  # the home and its panes; None where nothing moves
         self._panes = panes
@@ -110,13 +119,13 @@ class LightScene:
         name = choose_variant() if variant is None else variant
         mitsuba(name)
         inside = house.with_items(i for i in house.items if not i.is_outside)
-        tables = tables_from_house(inside, textures, recipe)
+        shown = {p for m in _materials_of(inside) for p in (m.texture_id, *map_key(m)[:2])}
+        used = {name: texture for name, texture in textures.items() if name in shown}
+        tables = tables_from_house(inside, used, recipe)
         outside = None
         if len(inside.items) < len(house.items):
             beyond = house.with_items(i for i in house.items if i.is_outside)
-            shown = {
-                beyond.materials[s.material].texture_id for i in beyond.items for s in i.surfaces
-            }
+            shown = {m.texture_id for m in _materials_of(beyond)}
             used = {name: texture for name, texture in textures.items() if name in shown}
             outside = beyond, tables_from_house(beyond, used, recipe)
         glass = None if recipe.materials.preset == "released" else panes_of_house(inside)

@@ -227,3 +227,4 @@ def test_a_house_with_maps_compiles_no_further_kernels() -> None:
         kernels = [k for k in dr.kernel_history() if k["type"] == dr.KernelType.JIT]
     assert kernels
     assert all(k["cache_hit"] for k in kernels)
+    assert len(scene.tables.texels) == 1  # the device alone keeps them

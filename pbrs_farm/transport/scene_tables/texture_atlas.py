@@ -72,7 +72,13 @@ def texture_atlas(
         normal = pictures.get(key[1] or "")
         if roughness is not None or normal is not None:
             map_slots[key] = added(_packed_maps(roughness, normal, key[2]))
-    return TextureAtlas(np.concatenate(parts), slots, map_slots)
+    # Let go of each part once it is copied.
+    texels = np.empty(first, np.uint32)
+    while parts:
+        part = parts.pop()
+        texels[first - part.size : first] = part
+        first -= part.size
+    return TextureAtlas(texels, slots, map_slots)
 
 
 def unpacked_colours(texels: NDArray[np.uint32]) -> F64:
