@@ -94,19 +94,6 @@ def drawn_paints(rng: np.random.Generator, family: PlanFamily) -> Paints:
     return Paints(tuple(chosen), "EEF1F1", family.floor, "C9C6BF", family.ceiling, design)
 
 
-def home_file(
-    storeys: Sequence[Storey],
-    catalogue: Catalogue,
-    rng: np.random.Generator,
-    stair: Stair | None = None,
-    *,
-    name: str = "home",
-    origin: str = "",
-) -> bytes:
-    """The bytes of a .sh3d; equal arguments, those of home_contents, give equal bytes."""
-    return home_contents(storeys, catalogue, rng, stair, name=name, origin=origin).archive()
-
-
 def home_contents(
     storeys: Sequence[Storey],
     catalogue: Catalogue,
@@ -116,7 +103,7 @@ def home_contents(
     name: str = "home",
     origin: str = "",
 ) -> HomeContents:
-    """Contents of a .sh3d with these storeys, from below; pieces without a model are left out."""
+    """Contents of a .sh3d with these storeys, from below, without pieces that lack a model; equal for equal arguments."""
     plan, placed = storeys[0].plan, [p for s in storeys for p in s.pieces]
     contents = HomeContents()
     home = contents.home

@@ -12,6 +12,7 @@ from shapely.geometry.base import BaseGeometry
 from shapely.ops import polygonize, unary_union
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.geometry.plan_surfaces import polygons_in
 
 NARROWEST_M: Final = 0.5
 WIDEST_M: Final = (
@@ -90,14 +91,10 @@ def ground_between(feet: Sequence[BaseGeometry], lines: Sequence[LineString]) ->
     ways = [*doorways(standing), *lines]
     # The area within the outer edge of walls and doorways, minus the walls.
     closed = shapely.union_all([standing, *(way.buffer(_ACROSS_M) for way in ways)])
-    whole = shapely.union_all([Polygon(p.exterior) for p in _polygons(closed)])
-    pieces = _polygons(shapely.difference(whole, standing))
+    whole = shapely.union_all([Polygon(p.exterior) for p in polygons_in(closed, _SLIVER_M2)])
+    pieces = polygons_in(shapely.difference(whole, standing), _SLIVER_M2)
     parts = [part for piece in pieces for part in parted_at_doorways(piece, ways)]
     return sorted(parts, key=lambda p: (p.bounds, p.area))
-
-
-def _polygons(shape: Any) -> list[Polygon]:
-    return [p for p in shapely.get_parts(shape) if p.geom_type == "Polygon" and p.area > _SLIVER_M2]
 
 
 def _is_room(part: Polygon) -> bool:
@@ -106,7 +103,7 @@ def _is_room(part: Polygon) -> bool:
 
 def _rings(walls: Any) -> list[Any]:
     """Their outlines and holes, the wall to the left of each."""
-    polygons = [p for p in shapely.get_parts(walls) if p.geom_type == "Polygon"]
+    polygons: list[Any] = polygons_in(walls)
     simple = [shapely.orient_polygons(p.simplify(_THINNEST_M / 2)) for p in polygons]
     return [ring for p in simple for ring in (p.exterior, *p.interiors)]
 

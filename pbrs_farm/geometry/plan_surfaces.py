@@ -29,6 +29,11 @@ def room_shape(room: Room) -> shapely.Geometry:
     return shapely.make_valid(shapely.Polygon(room.polygon))
 
 
+def polygons_in(shape: shapely.Geometry, least_m2: float = 0.0) -> list[shapely.Polygon]:
+    """The polygons of a plan area that are larger than least_m2."""
+    return [p for p in shapely.get_parts(shape) if p.geom_type == "Polygon" and p.area > least_m2]
+
+
 def counter_clockwise(polygon: Points2) -> Points2:
     """polygon (N, 2), reversed if it runs clockwise (with the second axis up)."""
     return polygon if signed_area(polygon) >= 0 else polygon[::-1].copy()

@@ -14,7 +14,7 @@ from pbrs_farm.core.house import House, Item, Source
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.generate.floor_plan import PlacedPiece, Storey
 from pbrs_farm.generate.generated_home import GeneratedHome, furnish_storeys
-from pbrs_farm.generate.home_file import home_file
+from pbrs_farm.generate.home_file import home_contents
 from pbrs_farm.generate.plans.plan_files import PlanFile, PlanStorey, plan_from_file, upright
 from pbrs_farm.generate.plans.plan_format import Part, part_of
 from pbrs_farm.prepare.stand_ins import with_stand_ins
@@ -64,7 +64,8 @@ def _walls_of_plan(file: PlanFile, name: str, fields: ReadFields) -> House:
     """The walls, floors, doors and windows of the storeys."""
     storeys = [Storey(s.plan, ()) for s in file.storeys]
     rng = np.random.default_rng(keys.seed("plan", repr([s.plan.walls for s in file.storeys])))
-    return read_home(home_file(storeys, EMPTY, rng, name=name), f"{name}.sh3d", fields=fields)
+    data = home_contents(storeys, EMPTY, rng, name=name).archive()
+    return read_home(data, f"{name}.sh3d", fields=fields)
 
 
 def box_only_items(house: House, storeys: Sequence[PlanStorey]) -> tuple[Item, ...]:

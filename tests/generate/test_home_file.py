@@ -25,7 +25,7 @@ from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.generate.drawn_plan import drawn_plan
 from pbrs_farm.generate.floor_plan import PlacedPiece, Plan, Storey
-from pbrs_farm.generate.home_file import home_file
+from pbrs_farm.generate.home_file import home_contents
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.read.sweethome3d.home import read_home
@@ -38,7 +38,8 @@ def plan(seed: int) -> Plan:
 
 
 def written(seed: int, pieces: tuple[PlacedPiece, ...] = (), catalogue: Catalogue = EMPTY) -> bytes:
-    return home_file([Storey(plan(seed), pieces)], catalogue, np.random.default_rng(seed))
+    storeys, rng = [Storey(plan(seed), pieces)], np.random.default_rng(seed)
+    return home_contents(storeys, catalogue, rng).archive()
 
 
 def read(data: bytes) -> House:

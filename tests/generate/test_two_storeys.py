@@ -18,7 +18,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import House, ItemKind, geometry_from_house
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.generate.floor_plan import OpeningKind, Plan, RoomType, Storey
-from pbrs_farm.generate.home_file import home_file
+from pbrs_farm.generate.home_file import home_contents
 from pbrs_farm.generate.openings import plan_faults
 from pbrs_farm.generate.programme import Wishes
 from pbrs_farm.generate.staircase import SLAB_M, Stair, n_risers, staircase
@@ -39,7 +39,8 @@ def home(seed: int) -> tuple[tuple[Plan, Plan], Stair]:
 def house(seed: int) -> House:
     plans, stair = home(seed)
     storeys = [Storey(plan, ()) for plan in plans]
-    return read_home(home_file(storeys, EMPTY, np.random.default_rng(seed), stair), "home.sh3d")
+    contents = home_contents(storeys, EMPTY, np.random.default_rng(seed), stair)
+    return read_home(contents.archive(), "home.sh3d")
 
 
 @pytest.mark.quick(1)
@@ -146,6 +147,6 @@ def test_a_small_area_leaves_fewer_bedrooms_rather_than_no_plan() -> None:
 def test_the_file_names_the_storey_that_the_program_shows_first() -> None:
     plans, stair = home(0)
     rng = np.random.default_rng(0)
-    data = home_file([Storey(plan, ()) for plan in plans], EMPTY, rng, stair)
+    data = home_contents([Storey(plan, ()) for plan in plans], EMPTY, rng, stair).archive()
     xml = ET.fromstring(zipfile.ZipFile(io.BytesIO(data)).read("Home.xml"))
     assert xml.get("selectedLevel") == xml.findall("level")[0].get("id")

@@ -12,6 +12,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Surface, corners_of_surfaces
 from pbrs_farm.core.mesh import area_vectors, face_areas, triangle_corners
 from pbrs_farm.geometry.doorways import NARROWEST_M, door_line, doorways, parted_at_doorways
+from pbrs_farm.geometry.plan_surfaces import polygons_in
 
 # A floor of more triangles is taken by its convex hull, so that time stays bounded.
 MAX_OUTLINE_FACES: Final = 20_000
@@ -144,10 +145,9 @@ def polygon_of(area: Any) -> F64 | None:
     (N, 2) float64, the first corner not repeated; holes are dropped. Slivers go and nearly straight
     corners with them. Pieces of a square centimetre and less are passed over.
     """
-    pieces = [g for g in shapely.get_parts(area) if g.geom_type == "Polygon" and g.area > 1e-4]
-    if not pieces:
+    largest = _largest(area, None)
+    if largest is None:
         return None
-    largest = max(pieces, key=lambda g: (g.area, g.bounds))
     # Opening removes slivers that a wall's bevel leaves; corners of walls stay where they are.
     opened = _grown(_grown(largest, -_SLACK_M), _SLACK_M)
     simple = shapely.simplify(_largest(opened, largest), _SLACK_M)
@@ -156,8 +156,7 @@ def polygon_of(area: Any) -> F64 | None:
 
 
 def _largest(area: Any, otherwise: Any) -> Any:
-    pieces = [g for g in shapely.get_parts(area) if g.geom_type == "Polygon" and g.area > 1e-4]
-    return max(pieces, key=lambda g: (g.area, g.bounds), default=otherwise)
+    return max(polygons_in(area, 1e-4), key=lambda g: (g.area, g.bounds), default=otherwise)
 
 
 def _faces_looking(surfaces: Sequence[Surface], sign: int) -> F64:

@@ -11,7 +11,7 @@ from pbrs_farm.core.arrays import Points2
 from pbrs_farm.core.classes import CEILING, FLOOR
 from pbrs_farm.core.house import Item, ItemKind, Room, Surface
 from pbrs_farm.geometry.doorways import door_line, ground_between
-from pbrs_farm.geometry.plan_surfaces import counter_clockwise, horizontal
+from pbrs_farm.geometry.plan_surfaces import counter_clockwise, horizontal, polygons_in
 from pbrs_farm.read.sweethome3d.ceiling_heights import CeilingHeights
 from pbrs_farm.read.sweethome3d.home_file.home_xml import (
     HomePlan,
@@ -111,7 +111,7 @@ def _simple(room: HomeRoom, materials: HomeMaterials) -> shapely.Polygon | None:
         return None
     polygon = shapely.Polygon(_coarse(room, materials))
     if not polygon.is_valid:
-        parts = _polygons(shapely.make_valid(polygon))
+        parts = polygons_in(shapely.make_valid(polygon), SLIVER_M2)
         materials.notes.add(
             "room-crosses-itself", room.place, "its outline crosses itself: largest part kept"
         )
@@ -138,16 +138,12 @@ def _coarse(room: HomeRoom, materials: HomeMaterials) -> Points2:
     return points
 
 
-def _polygons(shape: shapely.Geometry) -> list[shapely.Polygon]:
-    return [p for p in shapely.get_parts(shape) if p.geom_type == "Polygon" and p.area > SLIVER_M2]
-
-
 def room_nouns(rooms: list[ReadRoom], ceilings: CeilingHeights) -> tuple[Room, ...]:
     """The Room of each; its polygon without what later rooms take, if that leaves one piece."""
     nouns = []
     for k, room in enumerate(rooms):
         taken = [r.outline for r in _later(rooms, k)]
-        rest = _polygons(shapely.difference(room.outline, shapely.union_all(taken)))
+        rest = polygons_in(shapely.difference(room.outline, shapely.union_all(taken)), SLIVER_M2)
         outline = rest[0] if len(rest) == 1 and not rest[0].interiors else room.outline
         polygon = counter_clockwise(_ring(outline.exterior))
         height = ceilings.highest(room.level, polygon, is_flat=room.plan.is_ceiling_flat)
@@ -203,7 +199,7 @@ def _left_of(
 ) -> list[shapely.Polygon]:
     # The room's outline minus later rooms and the level's staircases.
     taken = [*later, cuts.get(room.level_id, shapely.Polygon())]
-    return _polygons(shapely.difference(room.outline, shapely.union_all(taken)))
+    return polygons_in(shapely.difference(room.outline, shapely.union_all(taken)), SLIVER_M2)
 
 
 def _floor_items(
