@@ -69,7 +69,9 @@ if __name__ == "__main__":
     home = pf.load("builtin", recipe="preview").set(**small)
     home = home.place(pf.generate_model("cup"), on="table")  # bop exports placed models
     walk = home.set(**{"cameras.source": "walk", "cameras.walk_frames": 3})
-    layers = ["albedo", "depth_z", "flow_forward", "occlusion_forward"]
+    layers = ["albedo", "roughness", "metallic", "depth_z", "flow_forward", "occlusion_forward"]
+    layers += ["depth_layers", "depth_layers_instance", "depth_layers_clear"]
+    layers += ["depth_sensor_d455", "depth_hole_d455"]
     pf.render_homes(walk, "walk", layers=layers, tracks=True)
     turn = home.set(**{"image.height_px": 32, "lens.model": "equirect"})
     pf.render_homes(turn, "turn", views=1)
