@@ -7,7 +7,7 @@ from __future__ import annotations
 
 import gc
 from collections import OrderedDict
-from collections.abc import Mapping
+from collections.abc import Container, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -108,7 +108,8 @@ class CachedHouse:
         """The GL renderer, with a GL context of this thread: use and close it in the thread that asked first."""
         from pbrs_farm.raster import Rasterizer
 
-        return Rasterizer(self.house, self.textures, self.recipe.raster)
+        colours = {m.texture_id for m in self.house.materials}
+        return Rasterizer(self.house, self._textures_once(colours), self.recipe.raster)
 
     def rasterizer_at(self, time_s: float | None) -> Rasterizer:
         """The GL renderer of the house at a time; the same object for all times."""
@@ -122,8 +123,14 @@ class CachedHouse:
         from pbrs_farm.transport.light_scene import LightScene
 
         # The scene holds its own texels: do not keep these for it.
-        textures = self.__dict__.get("textures") or decoded_textures(self.house)[0]
-        return LightScene.load(self.house, textures, self.recipe, self.sky)
+        return LightScene.load(self.house, self._textures_once, self.recipe, self.sky)
+
+    def _textures_once(
+        self, names: Container[str | None] | None = None
+    ) -> dict[str, NDArray[np.uint8]]:
+        """As `textures`, of some names if given, but not kept unless they are already."""
+        cached = self.__dict__.get("textures")
+        return decoded_textures(self.house, names)[0] if cached is None else cached
 
     def light_scene_at(self, time_s: float | None) -> LightScene:
         """The scene that carries light, of the house at a time; the same object for all times."""
@@ -170,13 +177,20 @@ class CachedHouse:
         gc.collect()
 
 
-def decoded_textures(house: House) -> tuple[dict[str, NDArray[np.uint8]], list[str]]:
-    """(H, W, 3 or 4) uint8 sRGB by id, and the ids of unreadable ones, whose surfaces stay plain."""
+def decoded_textures(
+    house: House, names: Container[str | None] | None = None
+) -> tuple[dict[str, NDArray[np.uint8]], list[str]]:
+    """(H, W, 3 or 4) uint8 sRGB by id, and the ids of unreadable ones, whose surfaces stay plain.
+
+    names: ids of the wanted ones; None = all.
+    """
     from pbrs_farm.images import decode_texture
 
     decoded: dict[str, Any] = {}
     unreadable = []
     for texture in house.textures.values():
+        if names is not None and texture.id not in names:
+            continue
         try:
             decoded[texture.id] = decode_texture(texture.data, texture.name, texture.media_type)
         except BadInput:

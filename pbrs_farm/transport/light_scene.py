@@ -105,7 +105,7 @@ class LightScene:
     @staticmethod
     def load(
         house: House,
-        textures: dict[str, NDArray[np.uint8]],
+        textures: dict[str, NDArray[np.uint8]] | Callable[[], dict[str, NDArray[np.uint8]]],
         recipe: Recipe,
         sky: Sky,
         *,
@@ -113,21 +113,24 @@ class LightScene:
     ) -> LightScene:
         """The scene of a repaired house; its window panes only mirror what rays from the camera show.
 
-        textures: id -> (H, W, 3 or 4) uint8 sRGB, row 0 at the top. Raises BadHouse when there
-        is no surface and MachineFailed when Mitsuba does not work here.
+        textures: id -> (H, W, 3 or 4) uint8 sRGB, row 0 at the top, or a function that decodes them, so
+        that nobody holds them longer than needed. Raises BadHouse when there is no surface and MachineFailed
+        when Mitsuba does not work here.
         """
         name = choose_variant() if variant is None else variant
         mitsuba(name)
         inside = house.with_items(i for i in house.items if not i.is_outside)
         shown = {p for m in _materials_of(inside) for p in (m.texture_id, *map_key(m)[:2])}
-        used = {name: texture for name, texture in textures.items() if name in shown}
+        pictures = textures() if callable(textures) else textures
+        used = {name: texture for name, texture in pictures.items() if name in shown}
         tables = tables_from_house(inside, used, recipe)
         outside = None
         if len(inside.items) < len(house.items):
             beyond = house.with_items(i for i in house.items if i.is_outside)
             shown = {m.texture_id for m in _materials_of(beyond)}
-            used = {name: texture for name, texture in textures.items() if name in shown}
+            used = {name: texture for name, texture in pictures.items() if name in shown}
             outside = beyond, tables_from_house(beyond, used, recipe)
+        del pictures, used
         glass = None if recipe.materials.preset == "released" else panes_of_house(inside)
         panes = None if glass is None else tables_from_house(glass, {}, recipe)
         moving = None

@@ -3,14 +3,18 @@
 from __future__ import annotations
 
 from collections import Counter
+from types import SimpleNamespace
 
+import numpy as np
 import pytest
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.house import Texture
 from pbrs_farm.core.recipe import recipe_from_name
+from pbrs_farm.images import png_from_array
 from pbrs_farm.prepare.source import resolve
-from pbrs_farm.run.house_cache import HouseCache
+from pbrs_farm.run.house_cache import HouseCache, decoded_textures
 from pbrs_farm.run.step_cache import Work
 from pbrs_farm.run.steps import run_step
 from pbrs_farm.store import MemoryStore
@@ -79,3 +83,15 @@ def test_light_names_the_step_it_lacks(work: Work) -> None:
     assert work.store.head(keys.marker_key(work.house_id, "illuminance")) is None
     with pytest.raises(BadInput, match="illuminance: is not done yet"):
         run_step("light", view_work(work, view))
+
+
+def test_only_the_named_textures_are_decoded() -> None:
+    png = png_from_array(np.zeros((2, 3, 3), np.uint8))
+    textures = {
+        name: Texture(name, name, "image/png", data)
+        for name, data in (("a", png), ("b", b"no picture"), ("c", png))
+    }
+    house = SimpleNamespace(textures=textures)
+    assert decoded_textures(house, {"a", "b"})[0].keys() == {"a"}  # type: ignore[arg-type]
+    assert decoded_textures(house, {"a", "b"})[1] == ["b"]  # type: ignore[arg-type]
+    assert decoded_textures(house)[0].keys() == {"a", "c"}  # type: ignore[arg-type]
