@@ -258,7 +258,7 @@ def _strategy(
         return Strategy(is_view_independent=is_independent)
     may_aim = goes_on & (vertex.depth + 1 < context.fields.max_depth)
     guiding = guiding_at(vertex.near, vertex.si.bsdf, beta, may_aim)
-    throughput = path.beta / path.faintness if may_reconnect is False else None
+    throughput = path.beta / mi.Color3f(path.faintness) if may_reconnect is False else None
     return Strategy(vertex.near, guiding, 1 - guiding.share, is_independent, beta=throughput)
 
 
