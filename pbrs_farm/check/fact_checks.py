@@ -48,7 +48,7 @@ def check_facts(case: ViewCase) -> None:
         elif house.items.get(int(row["id"]), {}).get("pose"):
             tally.expect("model poses", f"{place} instance {row['id']}", False, "lacks its pose")
     _check_tables(case)
-    _check_licences(case)
+    check_licences(case)
     if "layout" in table:
         _check_layout(case)
     _check_markers(case)
@@ -99,7 +99,7 @@ def _check_names(case: ViewCase, row: dict[str, Any]) -> None:
         judge("instance", place, case.tally, row=row, item=item, floats=floats)
 
 
-def _check_licences(case: ViewCase) -> None:
+def check_licences(case: ViewCase) -> None:
     """Licences are those of dress.json for the visible items' pieces and pictures, and that of the home."""
     house, table = case.house, case.view.table
     if "licences" not in table or not house.items:

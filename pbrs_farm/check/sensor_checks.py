@@ -37,7 +37,7 @@ _TOF_REACH_M = {
 # Layer of reasons -> its sensor; the reasons, by their numbers.
 _HOLES = {name.replace("sensor", "hole"): name for name in (*_MATCHING, *_TOF_REACH_M)}
 _CLEAR, _MIRROR, _TOO_DARK, _TOO_NEAR, _TOO_FAR, _GRAZING, _SHADOW, _EDGE = range(1, 9)
-# Least light that a sensor needs, share over m^2: 95 % or 15 % of it at the farthest reach.
+# Assumed least light that a sensor needs, share over m^2: of 95 % or 15 % reflectance at the farthest reach.
 _LEAST_RETURN = {
     "depth_sensor": 0.95 / 8.0**2,
     "depth_sensor_stereo": 0.95 / 10.0**2,

@@ -37,7 +37,9 @@ HOLE_ORDER = (
     Hole.EDGE,
     Hole.TOO_DARK,
 )
-FULL_REFLECTANCE, LOW_REFLECTANCE = 0.95, 0.15  # of the targets in data sheets
+# Assumed reflectance of the darkest surface measured at full reach. The data sheet of the Azure Kinect gives its
+# range for 15 to 95 % at 850 nm; for the others no source was found.
+FULL_REFLECTANCE, LOW_REFLECTANCE = 0.95, 0.15
 
 
 @dataclass(frozen=True, eq=False)

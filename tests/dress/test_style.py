@@ -31,5 +31,5 @@ def test_a_fifth_of_the_rooms_has_another_taste_and_the_homes_wood() -> None:
 
 
 def test_an_unknown_style_is_refused_in_one_line() -> None:
-    with pytest.raises(BadRecipe, match="no style 'gothic'"):
+    with pytest.raises(BadRecipe, match="style: gothic: no such style"):
         style_for(np.random.default_rng(0), "gothic")

@@ -19,7 +19,7 @@ from pbrs_farm.export.questions.asking import Question
 from pbrs_farm.export.questions.clips import Clip, Thing
 from pbrs_farm.export.questions.kinds import KINDS
 from pbrs_farm.export.questions.pairs import HIDDEN, pair_questions
-from tests.export.test_questions import clip_of, drafts, house_of, visible_item
+from tests.inputs.asked_clips import clip_of, drafts, house_of, visible_item
 
 
 def picture(name: str, *things: Thing, eye: Any = (4.0, 1.0, 0.0), hidden: Any = ()) -> Clip:

@@ -3,7 +3,6 @@
 import csv
 import json
 import math
-import random
 from collections.abc import Iterator
 from dataclasses import replace
 from types import SimpleNamespace
@@ -15,50 +14,16 @@ import pytest
 
 import pbrs_farm as pf
 from pbrs_farm.check.question_answers import wrong_answers
-from pbrs_farm.core.house import House, Item, MaterialKind
+from pbrs_farm.core.house import MaterialKind
 from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.export_views import export, remarks_of
 from pbrs_farm.export.nouns import noun_of
 from pbrs_farm.export.questions import asking, clips
 from pbrs_farm.export.questions.asking import Asker, Question, blind_scores, mean_relative_accuracy
 from pbrs_farm.export.questions.clips import Clip, Thing, is_countable
-from pbrs_farm.export.questions.kinds import KINDS, Draft, QuestionKind, bearing_deg
+from pbrs_farm.export.questions.kinds import Draft, QuestionKind, bearing_deg
 from pbrs_farm.export.questions.references import references_of
-from tests.sample.sampled_rooms import box, room_house
-
-KIND = {kind.name: kind for kind in KINDS}
-ROOM_M = 8.0
-
-
-def visible_item(
-    number: int, noun: str, x: float, z: float, size: Any = (0.5, 0.5, 0.5), y=0.0, **seen
-):
-    """A box whose middle is at (x, z) in plan, its bottom at height y."""
-    w, h, d = size
-    item = box((x - w / 2, y, z - d / 2), (x + w / 2, y + h, z + d / 2), name=f"{noun} {number}")
-    facts = {"first_glimpsed": 0, "first_seen": 0, "most_visible": 1.0} | seen
-    return Thing(number, noun, item, **facts)
-
-
-def house_of(*items: Item) -> House:
-    return room_house(list(items), ROOM_M, ROOM_M)
-
-
-def clip_of(*things: Thing, frames: int = 1, eye=(1.0, 1.5, 1.0), facts: Any = None) -> Clip:
-    pose = np.eye(4)
-    pose[:3, 3] = eye
-    table = {"world_from_camera_opencv": pose.tolist(), "instances": [], "width_px": 100} | (
-        facts or {}
-    )
-    view = SimpleNamespace(
-        facts=table, entry=SimpleNamespace(file=lambda _name: None), choice=Choice()
-    )
-    house = house_of(*(t.item for t in things))
-    return Clip("clip", [cast(ChosenView, view)] * frames, house, things)
-
-
-def drafts(kind: str, clip: Clip):
-    return list(KIND[kind].drafts(clip, random.Random(0)))
+from tests.inputs.asked_clips import ROOM_M, clip_of, drafts, house_of, visible_item
 
 
 def test_distance_is_between_the_nearest_places_of_the_meshes():

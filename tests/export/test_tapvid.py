@@ -131,7 +131,7 @@ def test_cotracker_reads_frames_tracks_depth_and_places(
 
 
 def test_a_point_behind_the_camera_has_the_place_of_the_nearest_frame() -> None:
-    from pbrs_farm.export.forms.cotracker import _places
+    from pbrs_farm.export.forms.cotracker import places_of_tracks
 
     facts = {"width_px": 4, "height_px": 4, "K": [[2, 0, 2], [0, 2, 2], [0, 0, 1]]}
     pose = np.eye(4)
@@ -140,5 +140,5 @@ def test_a_point_behind_the_camera_has_the_place_of_the_nearest_frame() -> None:
         for _ in range(3)
     ]
     depth = np.array([[1, 0, 3], [0, 0, 5]], np.float32)
-    places = _places(np.full((2, 3, 2), 2.0), depth, frames)
+    places = places_of_tracks(np.full((2, 3, 2), 2.0), depth, frames)
     np.testing.assert_allclose(places[..., 2], [[1, 1, 3], [5, 5, 5]])

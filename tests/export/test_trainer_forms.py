@@ -258,7 +258,7 @@ def test_covisibility_ends_at_a_wall() -> None:
 
 
 def test_points_outside_a_frames_pyramid_are_left_out_unseen() -> None:
-    from pbrs_farm.export.forms.wai import FramePoints, _box_corners, _may_see, _n_seen
+    from pbrs_farm.export.forms.wai import FramePoints, box_corners, may_see, n_seen
 
     rng = np.random.default_rng(4)
     k = np.array([[10.0, 0, 5], [0, 10, 5], [0, 0, 1]])
@@ -268,9 +268,9 @@ def test_points_outside_a_frames_pyramid_are_left_out_unseen() -> None:
         pose[:3, :3] = Rotation.random(rng=rng).as_matrix()
         frame = FramePoints(np.full((10, 10), 2, np.float32), k, pose, np.zeros((0, 3)), 1)
         points = rng.normal(size=(20, 3)) * 0.5 + rng.normal(size=3) * 3
-        if not _may_see(_box_corners(points), frame):
+        if not may_see(box_corners(points), frame):
             n_left_out += 1
-            assert _n_seen(points, frame) == 0
+            assert n_seen(points, frame) == 0
     assert n_left_out > 50
 
 

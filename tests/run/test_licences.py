@@ -11,7 +11,7 @@ import pytest
 
 from pbrs_farm.check.cases import ViewCase
 from pbrs_farm.check.certificate import Tally
-from pbrs_farm.check.fact_checks import _check_licences
+from pbrs_farm.check.fact_checks import check_licences
 from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import Catalogue, Picture, Piece, Place
@@ -76,7 +76,7 @@ def test_a_view_lists_the_licences_of_its_visible_models_and_pictures(tmp_path: 
             view=SimpleNamespace(table={"instances": rows, "licences": licences}),
             expect=lambda check, tally=tally: tally.at(check, "a view"),
         )
-        _check_licences(cast(ViewCase, case))
+        check_licences(cast(ViewCase, case))
         assert tally.n_failed == (licences != listed)
 
 

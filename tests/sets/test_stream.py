@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import hashlib
 import math
 import os
 import shutil
@@ -37,7 +36,7 @@ from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.transport.develop.mode_pictures import LinearAovs
 from pbrs_farm.views.stored_layers import ViewFacts
 from pbrs_farm.views.view_sample import SampleRequest
-from tests.sets.small_sets import small_set
+from tests.sets.streams import digest, streamed
 
 renders = [
     pytest.mark.long,
@@ -45,7 +44,6 @@ renders = [
         choose_variant().startswith("scalar"), reason="the kernels need LLVM or CUDA"
     ),
 ]
-LAYERS = ("colour", "normal", "albedo")
 
 
 def plan(folder: Path, n_homes: int = 5, **fields: Any) -> StreamPlan:
@@ -67,16 +65,6 @@ def view(value: float) -> CachedView:
     facts = replace(facts, K=tuple(tuple(row[:3]) for row in pose[:3]))
     labels = {"depth": np.full((3, 4), 1500, np.uint16)}
     return CachedView(facts, labels, {}, light, recipe_from_name("preview").tone)
-
-
-def digest(sample: dict[str, Any]) -> str:
-    """Digest of all entries of a sample."""
-    sha = hashlib.sha256()
-    for name, value in sorted(sample.items()):
-        array = np.asarray(value)
-        sha.update(f"{name} {array.dtype} {array.shape}".encode())
-        sha.update(array.tobytes() if array.dtype.kind != "U" else str(value).encode())
-    return sha.hexdigest()
 
 
 def test_each_epoch_has_each_view_once_in_another_order(tmp_path: Path) -> None:
@@ -178,15 +166,6 @@ def test_layers_of_light_are_refused(tmp_path: Path) -> None:
         pf.stream(file, layers="colours")
 
 
-def streamed(folder: Path, cache: Path, **options: Any) -> Stream:
-    """A stream of a set of two small homes with two views each."""
-    file = folder / "small.toml"
-    if not file.exists():
-        small_set(folder)
-        file.write_text(file.read_text().partition("[part.panoramas]")[0])
-    return pf.stream(file, layers=LAYERS, size=(64, 48), cache=cache, reuse=2, **options)
-
-
 @pytest.fixture(scope="module")
 def rendered(tmp_path_factory: pytest.TempPathFactory) -> Iterable[Stream]:
     """A stream whose first epochs are rendered."""
@@ -201,7 +180,7 @@ def rendered(tmp_path_factory: pytest.TempPathFactory) -> Iterable[Stream]:
 TRAINER = """
 import sys
 from pathlib import Path
-from tests.sets.test_stream import digest, streamed
+from tests.sets.streams import digest, streamed
 
 for epoch in (0, 1):
     stream = streamed(Path(sys.argv[1]), Path(sys.argv[2])).epoch(epoch)

@@ -98,13 +98,13 @@ def _table(frames: list[ChosenView]) -> dict[str, NDArray[Any]]:
         "coords": coords.astype(np.float32),
         "visibility": occluded,
         "occluded": occluded,
-        "traj_3d": _places(coords, tracks["depth_m"], frames).astype(np.float32),
+        "traj_3d": places_of_tracks(coords, tracks["depth_m"], frames).astype(np.float32),
         "intrinsics": np.stack(intrinsics).astype(np.float32),
         "matrix_world": np.stack(poses).astype(np.float32),
     }
 
 
-def _places(coords: F64, depth_m: NDArray[np.float32], frames: list[ChosenView]) -> F64:
+def places_of_tracks(coords: F64, depth_m: NDArray[np.float32], frames: list[ChosenView]) -> F64:
     """(N, T, 3) world, metres; of points behind the camera those of the nearest frame with them in front."""
     places = np.empty((*depth_m.shape, 3))
     for k, view in enumerate(frames):

@@ -131,14 +131,14 @@ def pairwise_covisibility(frames: list[FramePoints]) -> F32:
     """
     matrix = np.zeros((len(frames), len(frames)), np.float32)
     for i, frame in enumerate(frames):
-        corners = _box_corners(frame.points)
+        corners = box_corners(frame.points)
         for j, other in enumerate(frames):
-            if _may_see(corners, other):
-                matrix[i, j] = _n_seen(frame.points, other) / frame.n_grid
+            if may_see(corners, other):
+                matrix[i, j] = n_seen(frame.points, other) / frame.n_grid
     return matrix
 
 
-def _box_corners(points: F64) -> F64:
+def box_corners(points: F64) -> F64:
     """(8, 3) corners of the box around the points; none without points."""
     if not len(points):
         return points
@@ -146,7 +146,7 @@ def _box_corners(points: F64) -> F64:
     return np.array([[ends[k >> axis & 1, axis] for axis in range(3)] for k in range(8)])
 
 
-def _may_see(corners: F64, frame: FramePoints) -> bool:
+def may_see(corners: F64, frame: FramePoints) -> bool:
     """False if all corners of a box are outside one side of the frame's pyramid."""
     height, width = frame.depth.shape
     pose = frame.camera_from_world
@@ -155,7 +155,8 @@ def _may_see(corners: F64, frame: FramePoints) -> bool:
     return bool(len(corners)) and all(bool((side >= 0).any()) for side in sides)
 
 
-def _n_seen(points: F64, frame: FramePoints) -> int:
+def n_seen(points: F64, frame: FramePoints) -> int:
+    """Number of points in the picture of a frame whose depth there is their own."""
     local = points @ frame.camera_from_world[:3, :3].T + frame.camera_from_world[:3, 3]
     local = local[local[:, 2] > _LEAST_Z_M]
     z = local[:, 2]
