@@ -166,7 +166,7 @@ def _tof_sigma_m(name: str, z: F64, angle: F64) -> F64:
 
 
 class _Seen(NamedTuple):
-    """The surfaces of all pixels, as far as sensors depend on them; each (H, W)."""
+    """Properties of the surface at each pixel that sensors depend on; each (H, W)."""
 
     z: F64  # m, 0 = nothing
     angle: F64  # rad, between ray and normal

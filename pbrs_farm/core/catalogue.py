@@ -107,9 +107,9 @@ class Catalogue:
     _shapes: dict[str, Shape | None] = field(default_factory=dict, init=False, repr=False)
 
     def with_licences(self, licences: Sequence[str]) -> Catalogue:
-        """Only what is generated, and library pieces and pictures of these licences; () for all.
+        """Only generated pieces and library pieces and pictures of these licences; () for all.
 
-        "CC-BY" means each version of it, but not CC-BY-SA; a piece without a named licence has none.
+        "CC-BY" means each version of it, but not CC-BY-SA; a piece without a named licence never matches.
         """
         if not licences:
             return self

@@ -267,7 +267,7 @@ def _classes_of(hint: Any) -> list[type]:
 
 
 def _text_of(value: Any) -> str:
-    """A value as Python text, or its kind if that is long."""
+    """A value as Python text, or the kind of a long one."""
     text = " ".join(repr(value).split())
     if isinstance(value, np.ndarray) and value.size > 4:
         return f"an array of shape {value.shape}"

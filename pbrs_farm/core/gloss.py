@@ -35,7 +35,7 @@ class Coat(NamedTuple):
 
 
 def coat_of(material: Material) -> Coat | None:
-    """The coat of a material that is neither mirror nor glass; None for a matte one or a lampshade.
+    """The coat of a material other than mirror and glass; None for a matte one or a lampshade.
 
     Ks is the strength of a clear coat, F0 = 0.08 Ks (0.04 = glass of index 1.5 at Ks 0.5), unless Ks is
     four times brighter than Kd: then the surface is a metal of reflectance Ks. A material with a roughness
@@ -65,7 +65,7 @@ def coat_of(material: Material) -> Coat | None:
 
 
 def mirror_reflectance(material: Material) -> F64:
-    """(3,) linear reflectance of a mirror: its Ks if that is bright."""
+    """(3,) linear reflectance of a mirror: its Ks if bright."""
     ks = linear_from_srgb(np.clip(np.nan_to_num(material.specular), 0, 1))
     tint = ks if ks @ LUMINANCE > 0.3 else np.full(3, _MIRROR_REFLECTANCE)
     return np.asarray(np.minimum(tint, _MOST_MIRRORED))

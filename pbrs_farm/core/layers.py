@@ -54,7 +54,7 @@ class Layer:
     version: int = 1
     # Its pixels show the albedo, which the recipe's materials hold to a limit.
     shows_albedo: bool = False
-    # Layers that are written with it, and without which it is useless.
+    # Layers written with it, without which it is useless.
     beside: tuple[str, ...] = ()
 
     @property

@@ -140,7 +140,7 @@ def closed_edge_share(places: NDArray[np.floating]) -> float:
 
 
 def outside_area(corners: F64) -> float:
-    """m2 of triangles (F, 3, 3) seen from outside: both sides of a mesh that is open.
+    """m2 of triangles (F, 3, 3) seen from outside: both sides of an open mesh.
 
     A closed mesh counts once, since its inside cannot be seen; a curtain or a leaf counts from both sides. A
     mesh is closed if two faces share most of its edges, with corners rounded so that seams of textures do
@@ -218,7 +218,7 @@ def distances_to_triangles(points: F64, corners: F64) -> F64:
     has_area = _dot(normal, normal) > 0
     squared = np.maximum(_dot(normal, normal), _TINY)
 
-    # The nearest point is the foot if that is inside the triangle.
+    # The nearest point is the foot if inside the triangle.
     foot = normal * (_dot(a, normal) / squared)
     to_foot = foot - a
     u = _dot(_cross(to_foot, ac), normal) / squared

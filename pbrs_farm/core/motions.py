@@ -68,7 +68,7 @@ class Motion:
 
 
 def fault_of_motion(motion: Motion) -> str:
-    """The error of a motion by itself; "" without one."""
+    """The error of a single motion; "" without one."""
     width = JOINT_VALUES if motion.is_of_joint else BODY_VALUES
     times = motion.times_s
     if not times or len(times) != len(motion.values):

@@ -219,7 +219,7 @@ def changed_recipe(
 def with_settings(recipe: Recipe, settings: Mapping[str, Any]) -> Recipe:
     """A copy of the recipe with other values of some fields, "light.spp" -> 64. Raises as changed_recipe.
 
-    Only fields that were set are kept: a preset of a sensor or lens fills the other fields again, so that
+    Only the given fields are kept: a preset of a sensor or lens fills the other fields again, so that
     changing the preset changes all fields it implies. Values are validated as from a file.
     """
     if not settings:

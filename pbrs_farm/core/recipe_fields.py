@@ -50,7 +50,7 @@ def field(
 
 
 def _words_of_text(value: Any) -> Any:
-    """The words of "CC0:CC-BY", as a command line has them; other values as they are."""
+    """The words of a command line's "CC0:CC-BY"; other values unchanged."""
     return tuple(filter(None, value.split(":"))) if isinstance(value, str) else value
 
 

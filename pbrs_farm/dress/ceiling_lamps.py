@@ -107,7 +107,7 @@ def _least_side(room: RoomSpace) -> float:
 
 
 def _factor(shape: Shape, height_m: float) -> float | None:
-    """Scale at which the shape is at most height_m tall; None if that is too small."""
+    """Scale at which the shape is at most height_m tall; None if too small."""
     tall = float(shape.bounds[1, 1])
     factor = min(1.0, height_m / tall)
     return factor if factor > 0.6 else None

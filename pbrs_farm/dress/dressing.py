@@ -71,7 +71,7 @@ def dress(
 
         dressed, report = dress(house, EMPTY, DressFields(), seed=1)
 
-    A house that is repaired afterwards needs dressed_house and refit_after_repair: repair may remove
+    A house repaired afterwards needs dressed_house and refit_after_repair: repair may remove
     the wall behind a picture.
     """
     dressed = dressed_house(house, catalogue, fields, seed)
@@ -152,7 +152,7 @@ def dress_in_place(
 
 
 def _merge_gates(before: tuple[Gate, ...], after: tuple[Gate, ...]) -> tuple[Gate, ...]:
-    """The current gates, with the items that were removed for them before."""
+    """The current gates, with the items removed for them before."""
     taken = {gate.name: gate.n_taken_out for gate in before}
     return tuple(
         gate.model_copy(update={"n_taken_out": gate.n_taken_out + taken.get(gate.name, 0)})
@@ -187,7 +187,7 @@ def _report_of_dressing(
 
 
 def _count_added(items: Iterable[Item], pieces: Mapping[str, Piece]) -> dict[str, int]:
-    """Added items that are present in the end, by part and group."""
+    """Added items present in the end, by part and group."""
     counts = Counter(f"{pass_that_added(item)}: {group_of(item, pieces)}" for item in items)
     return dict(sorted(counts.items()))
 

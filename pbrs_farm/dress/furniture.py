@@ -158,7 +158,7 @@ def _generated(
 def model_from_catalogue(
     catalogue: Catalogue, kind: WantedKind, width: float, seed: int, own_share: float
 ) -> Model | None:
-    """A model of about that width; None if there is none."""
+    """A model of about that width, if any."""
     fit = [
         p
         for p in catalogue.of(*kind.groups)
@@ -181,7 +181,7 @@ def model_from_catalogue(
 def _find_spot(
     house: MutableHouse, floor: RoomFloor, kind: WantedKind, model: Model, rng: np.random.Generator
 ) -> FloorSpot | None:
-    """A random free place for the piece; None if there is none."""
+    """A random free place for the piece, if any."""
     low, high = model[1].bounds
     w, h, d = (float(v) for v in high - low)
     if floor.is_too_full(w * d):

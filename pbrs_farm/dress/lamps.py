@@ -167,7 +167,7 @@ def _ways_are_open(house: MutableHouse, room_id: str) -> bool:
 def _spot_on_top(
     house: MutableHouse, space: HouseSpace, number: int, place: F64, shape: Shape
 ) -> F64 | None:
-    """(3,) position for the shape on the item's flat and free top; None if there is none."""
+    """(3,) position for the shape on the item's flat and free top, if any."""
     low, high = shape.bounds
     radius = float(np.abs([low[[0, 2]], high[[0, 2]]]).max())
     foot = [s.positions for s in shape.surfaces]

@@ -20,7 +20,7 @@ class Painted(NamedTuple):
 
 
 class Painting:
-    """A task that is painted once, by the thread or by its first user."""
+    """A task painted once, by the thread or by its first user."""
 
     def __init__(self, paint: Callable[[], Painted]) -> None:
         self._paint = paint

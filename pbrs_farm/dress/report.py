@@ -25,8 +25,8 @@ class Gate(Record):
     """A rule that a dressed house must keep, and what came of it."""
 
     name: str  # "penetration", "support", "doors", "windows", "path", "fronts", "must_haves"
-    n_checked: int  # pairs, items or doors that were measured
-    n_taken_out: int  # violating items that were removed or restored
+    n_checked: int  # measured pairs, items or doors
+    n_taken_out: int  # violating items removed or restored
     n_left: int  # violations that remain in the final house
 
 

@@ -314,7 +314,7 @@ def _front_quarter(support: Support, room: Room, has_front: bool) -> int:
     right, front, left, back = support.open_sides
     is_open = {0: front, 1: right, 2: back, 3: left}
     area = Polygon(room.polygon)
-    # A top that is open on all sides faces the room; a shelf faces its open side.
+    # A top open on all sides faces the room; a shelf faces its open side.
     if has_front and is_open[0] and _way_to_wall(support, 0, area) > 0.25:
         return 0
     reach = {q: _way_to_wall(support, q, area) for q in is_open}

@@ -56,7 +56,7 @@ def material_planes(view: ChosenView) -> dict[str, F32]:
 
 
 def opaque_pixels(view: ChosenView) -> Bools:
-    """(H, W) pixels with a surface that is neither glass nor a mirror, as far as the view has these layers."""
+    """(H, W) pixels with a surface, without glass and mirrors where the view has these layers."""
     counts = np.asarray(view.array("valid") > 0)
     for clear in ("glass", "mirror"):
         if view.has(clear):

@@ -185,7 +185,7 @@ def view_bytes(gltf: Gltf, index: Any) -> bytes:
 def accessor_array(gltf: Gltf, index: Any) -> NDArray[Any]:
     """(count, components) array of accessor index in its own dtype, with sparse values applied.
 
-    Raises BadHouse for an accessor that is damaged or not of geometry.
+    Raises BadHouse for an accessor damaged or not of geometry.
     """
     place, accessor = f"accessors[{index}]", entry(gltf, "accessors", index)
     dtype = DTYPES.get(_hashable(accessor.get("componentType")))

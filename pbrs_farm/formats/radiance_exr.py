@@ -48,7 +48,7 @@ class RadianceExr:
             raise BadInput(self.place, str(error), "no such layer") from None
 
     def total(self) -> F32:
-        """(H, W, 3) float32 radiance of all light together; BadInput if there is none."""
+        """(H, W, 3) float32 radiance of all light together; BadInput without light."""
         names = sorted({name.partition(".")[0] for name in self.planes})
         lamps = [name for name in names if name.startswith("lamp")]
         indoor = ["indoor"] if "indoor" in names else lamps

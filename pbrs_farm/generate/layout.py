@@ -84,7 +84,7 @@ def layout(programme: Programme, rng: np.random.Generator, *, is_fixed: bool = F
 
 
 def easier_programmes(programme: Programme) -> list[tuple[str, Programme]]:
-    """(what was dropped, remaining programme), starting with the programme itself."""
+    """(dropped rooms, remaining programme), starting with the programme itself."""
     steps = [("", programme)]
     for left_out, change in (
         ("these rooms adjacent", {"adjacent": ()}),

@@ -1,4 +1,4 @@
-"""Generated doors and windows, for homes whose catalogue has none of the right size; no effects.
+"""Generated doors and windows, for homes without one of the right size in the catalogue; no effects.
 
 A shape fills the opening: metres, its base centred at the origin, x along the wall, its front (the
 room a door swings into) towards +z. A home has one design of doors and one of windows.

@@ -31,7 +31,7 @@ _OFF_M: Final = 1e-3  # off the end itself
 _SQUARE: Final = 0.9  # least cosine between a wall's sides and the way out of its end
 _AT_EDGE_M: Final = 0.15  # walls nearer to the edge of a ground are its own
 HALF_M: Final = 0.05  # half the thickness that walls without one are given
-_JOIN_M: Final = 0.1  # maximum gap between walls that were meant to touch, metres
+_JOIN_M: Final = 0.1  # maximum gap between touching walls, metres
 _REACH_M: Final = (
     0.02  # extension into the walls at both ends, so that rooms are fully separated, metres
 )

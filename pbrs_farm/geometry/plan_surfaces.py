@@ -30,7 +30,7 @@ def room_shape(room: Room) -> shapely.Geometry:
 
 
 def polygons_in(shape: shapely.Geometry, least_m2: float = 0.0) -> list[shapely.Polygon]:
-    """The polygons of a plan area that are larger than least_m2."""
+    """The polygons of a plan area above least_m2."""
     return [p for p in shapely.get_parts(shape) if p.geom_type == "Polygon" and p.area > least_m2]
 
 

@@ -46,7 +46,7 @@ def object_views(
         vertex = int(rng.integers(len(vertices)))
         distance = diagonal * rng.uniform(MIN_DIAGONALS, MAX_DIAGONALS)
         outwards = vertices[vertex]
-        # Keep the camera upright where that is possible.
+        # Keep the camera upright where possible.
         at_pole = np.arccos(min(1.0, abs(float(outwards[1])))) <= POLE_RAD
         up = _UP_AT_POLES if at_pole else _UP
         camera = Camera.look(intrinsics, centre + distance * outwards, -outwards, up)

@@ -71,7 +71,7 @@ class TrainingPlan:
     # Machine
     device: str = "auto"  # auto, cpu, cuda
     threads: int = 0  # threads of torch, 0 = its default
-    bf16: bool = False  # forward pass in bfloat16, unless that is slower on this processor
+    bf16: bool = False  # forward pass in bfloat16, unless slower on this processor
     channels_last: bool = True
     memory_gb: float = 4.0  # maximum size of training views in memory; larger sets are streamed
     workers: int = 0  # processes that read streamed views

@@ -37,7 +37,7 @@ DARK_LX: Final = 1.0  # a room with less by all light is dark: full moonlight is
 
 _SPP: Final = 32  # paths a point
 _ABOVE_FLOOR_M: Final = 0.05  # above carpets
-_MAX_ATTEMPTS: Final = 200  # attempts to find a point in a polygon that is thin in its box
+_MAX_ATTEMPTS: Final = 200  # attempts to find a point in a polygon thin in its box
 
 
 def illuminance_record(

@@ -58,7 +58,7 @@ def mirrored_hits(
     """Replace hits on mirrors by those of their reflections; other pixels keep hit.
 
     Depth and normal are those of the virtual image; item and face those of the real one. Without a hit in
-    the mirror there is none. first_hit, textures: as of LabelInputs. Its points must not be used.
+    the mirror there is no surface. first_hit, textures: as of LabelInputs. Its points must not be used.
     """
     is_mirror = mirror_faces(geometry, house)
     face, depth = hit.face.reshape(-1).copy(), hit.depth_z.reshape(-1).copy()

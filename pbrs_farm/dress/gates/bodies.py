@@ -138,7 +138,7 @@ def _shell(vertices: F64, faces: Faces) -> Shell:
     vertices, faces = vertices[used], numbers.reshape(-1, 3)
     low, high = points_bounds(vertices)
     is_closed = edges_are_paired(faces)
-    # Flip a closed shell that is inside out; one without volume is a sheet.
+    # Flip an inverted closed shell; one without volume is a sheet.
     if is_closed:
         volume = signed_volume(vertices[faces], low)
         is_closed = abs(volume) > 1e-9

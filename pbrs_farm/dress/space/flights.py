@@ -25,7 +25,7 @@ _REACH_M: Final = 0.4  # stairs are taken for a room's own so far outside it
 
 @dataclass(frozen=True, slots=True)
 class Flights:
-    """Plan areas of the stairs of a room, empty if there are none."""
+    """Plan areas of the stairs of a room, empty without stairs."""
 
     under: BaseGeometry  # the stairs themselves
     before: BaseGeometry  # where one steps on and off

@@ -41,7 +41,7 @@ from pbrs_farm.dress.surfaces.wall_materials import REVEAL, RestOfWall, RoomWall
 from pbrs_farm.home.room_use import RoomKind
 
 PASS = "surfaces"
-_KEPT_SHARE = 0.1  # share of photographed floors and walls that are kept
+_KEPT_SHARE = 0.1  # share of photographed floors and walls kept
 
 
 def room_frame(area: BaseGeometry) -> tuple[F64, F64]:

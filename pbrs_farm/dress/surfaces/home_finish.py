@@ -31,7 +31,7 @@ WOOD_FLOORS = ("planks", "strip", "laminate", "herringbone", "chevron")
 _MARBLES = tuple(zip(COLOURS["marbles"], COLOURS["marble_veins"], strict=True))
 _DIRT = rgb("b9b5ac")
 _PRINTED_CARPETS = 0.35  # share of carpets with a pattern
-_ALL_WALLS = 0.35  # share of wall coverings that are on all walls instead of one
+_ALL_WALLS = 0.35  # share of wall coverings on all walls instead of one
 
 
 @dataclass(frozen=True, slots=True)

@@ -51,7 +51,7 @@ def _video(frames: list[ChosenView]) -> dict[str, Any]:
 
 
 def film_tracks(frames: list[ChosenView]) -> dict[str, NDArray[Any]]:
-    """Arrays of tracks.npz for these frames of a film and the points that are visible in one of them.
+    """Arrays of tracks.npz for these frames of a film and the points visible in one of them.
 
     "points" are shares of the picture's width and height. BadInput without tracks.npz or for another film's.
     """

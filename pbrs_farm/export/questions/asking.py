@@ -142,7 +142,7 @@ def blind_scores(questions: Sequence[Question]) -> dict[str, tuple[int, float, f
     The first gives the best constant answer: for choices, the larger of the most frequent letter's share
     and the most frequent answer's share; for numbers, the best constant's mean relative accuracy. The
     second reads the question: it gives the usual answer of the other questions with the same words,
-    the most frequent one or the median, and that of all others if there is none.
+    the most frequent one or the median, else that of all others.
     """
     by_kind: dict[str, list[Question]] = defaultdict(list)
     for question in questions:

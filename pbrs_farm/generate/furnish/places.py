@@ -59,7 +59,7 @@ class Places:
         """Mask (N,) of alive places that remain after a template: bodies overlap neither bodies nor free areas."""
         bodies, clear = _rect_array(standing.bodies), _rect_array(standing.clear)
         taken = np.concatenate([bodies, clear])
-        # Test only places that are still possible.
+        # Test only places still possible.
         remaining = alive.copy()
         rows = np.flatnonzero(alive)
         hit = overlap(self.bodies[rows], taken).any(1) | overlap(self.clear[rows], bodies).any(1)
@@ -119,7 +119,7 @@ def places_of(group: PieceGroup, space: FurnishSpace, rng: np.random.Generator) 
 
 
 def fixed_places(standings: Sequence[Standing]) -> Places:
-    """Places that were determined elsewhere."""
+    """Places determined elsewhere."""
     frames = frames_array([p.frame for p in standings])
     scores = np.array([p.score for p in standings], np.float64)
     return _sorted_places(

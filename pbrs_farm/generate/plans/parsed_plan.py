@@ -21,7 +21,7 @@ from pbrs_farm.generate.plans.wall_tops import WallTop
 
 MAX_THINGS: Final = 3_000
 _FILLED: Final = 0.85  # a shape that fills less of its rectangle is made of several boxes
-_MOST_CORNERS: Final = 12  # maximum corners of a shape that is cut into boxes
+_MOST_CORNERS: Final = 12  # maximum corners of a shape cut into boxes
 _LEAST_BOX_M2: Final = 0.08
 
 

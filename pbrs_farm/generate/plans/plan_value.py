@@ -280,7 +280,7 @@ class _Openings:
             text = f"is {far[wall]:.1f} m from the nearest wall"
             raise BadInput(self.path, place, text, hint=f"within {_REACH_M} m of one")
         if self.is_of_machine:
-            # Among about equally near walls choose one that is long enough.
+            # Among about equally near walls choose a long enough one.
             fits = [k for k in far if self.walls[k].length >= width + 0.04 and far[k] <= _REACH_M]
             best = min(fits, key=lambda k: (far[k], k), default=wall)
             return best if far[best] <= far[wall] + 0.2 else wall

@@ -357,7 +357,7 @@ def _wall_points_around(frame: _WallFrame, axes: F64, low: F64, high: F64) -> li
 
 
 def _hole(points: F64, low: F64, high: F64) -> tuple[F64, F64] | None:
-    """(low, high) along and up of the wall's hole around low..high; None if there is none."""
+    """(low, high) along and up of the wall's hole around low..high, if any."""
     s, y = points[:, 0], points[:, 1]
     # The rim of a hole is near the door's outline and away from the wall's ends.
     inner = (s > s.min() + _RIM_M) & (s < s.max() - _RIM_M)

@@ -28,7 +28,7 @@ _BOOT: Final = PATH_FROM_PARENT + (
 def read_apart(reader: str, given: GivenFile, fields: ReadFields) -> House:
     """The house that the function `module:function` reads, in a child process.
 
-    A process that is itself watched reads directly. Raises the reader's errors; BadHouse if the child crashes.
+    A watched process reads directly. Raises the reader's errors; BadHouse if the child crashes.
     """
     if is_watched():
         house: House = pkgutil.resolve_name(reader)(given, fields)

@@ -227,7 +227,7 @@ class _Dataset:
         return self.folder.name_from(posixpath.dirname(config), reference)
 
     def urdf(self, template: str) -> str | None:
-        """Name of the URDF of an articulated object's template; None if it has none."""
+        """Name of the URDF of an articulated object's template, if any."""
         settings, config = self.template(template, "ao") or ({}, "")
         named = settings.get("urdf_filepath")
         if isinstance(named, str):

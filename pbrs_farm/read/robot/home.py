@@ -95,7 +95,7 @@ def _models(folder: RootFolder, name: str, notes: Notes) -> list[SdfModel]:
 
 
 class _Scene:
-    """The glTF scene of a home; state: the models added so far, and the counts of what is missing."""
+    """The glTF scene of a home; state: the models added so far, and the counts of missing files."""
 
     def __init__(self, built: Assembly, notes: Notes) -> None:
         self.built = built

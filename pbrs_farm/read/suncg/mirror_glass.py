@@ -52,7 +52,7 @@ def mirror_slot_of_table(
 ) -> int | None:
     """The position in the MTL of the glass of a dressing table's mirror; None without one.
 
-    The pane is upright, faces the front (z), and is part of a piece that is deeper below. Only the pane has its
+    The pane is upright, faces the front (z), and is part of a piece deeper below. Only the pane has its
     material, which is plain and grey or bluish. A chest of drawers has no such pane.
     """
     if nyu40 != DRESSER and _TABLES.isdisjoint(class_words):

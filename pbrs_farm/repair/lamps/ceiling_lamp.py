@@ -200,7 +200,7 @@ def heights_above(house: House, room: Room, places: F64) -> F64:
 
 
 def _heights_to_hang_from(house: House, room: Room, places: F64) -> F64:
-    """Like heights_above; if no part of the building is above, roofs that are items count."""
+    """Like heights_above; if no part of the building is above, roof items count."""
     heights = heights_above(house, room, places)
     is_open = np.isinf(heights)
     roofs = [s for i in house.items if i.nyu40 in (OTHERSTRUCTURE, CEILING) for s in i.surfaces]

@@ -24,7 +24,7 @@ from pbrs_farm.repair.structure.walls import Wall
 
 _COINCIDE_M = 0.001  # walls nearer than this to a room lie in one plane with its own
 _LEAST_LEFT_M = 0.01  # thickness that must be left behind a rim
-_LEAST_LEFT_SHARE = 0.25  # of the wall's thickness, if that is less
+_LEAST_LEFT_SHARE = 0.25  # of the wall's thickness, if less
 _OVERLAP_M2 = 1e-3  # outlines that share less lie side by side
 
 

@@ -185,7 +185,7 @@ def _kinds(a: Sequence[PictureFacts], b: Sequence[PictureFacts]) -> list[dict[st
 
 
 def mean_histogram(pictures: Sequence[PictureFacts], name: str) -> F64 | None:
-    """Mean histogram of the pictures with one; None if there are none."""
+    """Mean histogram of the pictures with one, if any."""
     rows = [picture.histograms[name] for picture in pictures if name in picture.histograms]
     return np.asarray(np.mean(rows, axis=0)) if rows else None
 

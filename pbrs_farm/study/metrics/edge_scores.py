@@ -177,6 +177,6 @@ def _average_precision(precision: F64, recall: F64) -> float:
 
 
 def _recall_at_half(precision: F64, recall: F64) -> float:
-    """Recall at a precision of one half, or at the least precision if that is higher."""
+    """Recall at a precision of one half, or at the least precision if higher."""
     precisions, first = np.unique(precision, return_index=True)
     return float(np.interp(max(float(precisions[0]), 0.5), precisions, recall[first]))

@@ -8,7 +8,7 @@ import torch
 from torch import Tensor
 from torch.nn import functional
 
-_SCALE_SHARE: Final = 0.5  # share of a view's common error of log depth that is forgiven
+_SCALE_SHARE: Final = 0.5  # forgiven share of a view's common error of log depth
 
 
 def normal_loss(output: Tensor, normal: Tensor, valid: Tensor, *, kind: str, over: str) -> Tensor:

@@ -82,7 +82,7 @@ class NormalsTask(StudyTask):
         total = np.zeros(targets[0]["normal"].shape, np.float64)
         for target in targets:
             total += target["normal"] * target["valid"][..., None]
-        # Pixels that are valid in no view get the mean over all pixels.
+        # Pixels valid in no view get the mean over all pixels.
         empty = np.linalg.norm(total, axis=-1) == 0
         total[empty] = total.sum((0, 1))
         length = np.linalg.norm(total, axis=-1, keepdims=True)

@@ -75,7 +75,7 @@ def _enlarge(batch: Batch, shares: Tensor, shifts: Tensor) -> Batch:
 
 
 def rotate_cameras(batch: Batch, task: StudyTask, angles: Tensor, hfov_deg: float) -> Batch:
-    """The views of cameras that are pitched up and rolled clockwise by angles (B, 2), radians.
+    """The views of cameras pitched up and rolled clockwise by angles (B, 2), radians.
 
     The picture of a rotated camera is a homography of the old one for any depth; normals rotate with
     the camera. hfov_deg: field of view of views without rays. Pixels outside the old picture have the

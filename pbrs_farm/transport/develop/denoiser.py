@@ -53,7 +53,7 @@ def denoise_radiance(
 def _pyoidn() -> Any:
     """The binding of the denoiser; MachineFailed when it cannot be imported."""
     try:
-        # pyoidn would import torch for tensors that are never passed here: a second and 200 MB.
+        # pyoidn would import torch for tensors never passed here: a second and 200 MB.
         with _hidden("torch"):
             import pyoidn
     except ImportError as error:

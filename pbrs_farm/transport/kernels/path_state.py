@@ -63,7 +63,7 @@ class PathContext(NamedTuple):
 
 @dataclass
 class PathState:
-    """A path in progress: its ray, and how that was sampled."""
+    """A path in progress: its ray and the sampling of that ray."""
 
     o: mi.Point3f
     d: mi.Vector3f

@@ -239,7 +239,7 @@ def _mirrored_ray(
     beta = path.beta * (reflectance / chance)
     o = offset_ray_origin(si.p, si.ng)
     is_followed = (u < chance) & (dr.dot(d, si.ng) > 0)
-    # The guides leave out reflections that are followed by chance: the denoiser expects guides
+    # The guides leave out reflections followed by chance: the denoiser expects guides
     # without noise.
     share = dr.select(chance < 1, 0, share)
     return MirroredRay(active & vertex.splits, is_followed, o, d, beta, share)

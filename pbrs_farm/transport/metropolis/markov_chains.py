@@ -278,7 +278,7 @@ def _proposed_state(film: Film, y: SplitPath, pixel: Any, reconnects: Any) -> tu
 def _move(
     film: Film, chain: Any, x: _State, proposed: _State, a: Any, accept: Any, done: Any
 ) -> _State:
-    """State of a chain after a step that is accepted with probability a.
+    """State of a chain after a step accepted with probability a.
 
     Splats the replaced path with its accumulated weight, or the rejected one. The shared part waits for the
     end of the round (reconnection.py).

@@ -19,7 +19,7 @@ from pbrs_farm.transport.kernels.path_state import (
 SUFFIX_FLOATS: Final = 36
 SUFFIX_PACKETS: Final = SUFFIX_FLOATS // 4
 MAX_SHARED_PDF: Final = 4.0  # 1 / m2; by a matte surface, 0.28 m straight before it
-# Columns of a suffix that are written one by one; record_suffix lists the others.
+# Columns of a suffix written one by one; record_suffix lists the others.
 # At the end _PDFS holds the share of p2 drawn by the surface, _GUIDED_PDF the rest of p2.
 _PDFS, _ARRIVING, _EMITTER_Z, _OWN_LIGHT, _GUIDED_PDF = 3, 28, 31, 32, 35
 

@@ -56,9 +56,7 @@ class SceneTables:
     lamp_faces: NDArray[np.uint32]  # (T,) face
     lamp_areas: F32  # (T,) running sum of areas over the lamp's area
     lamp_symmetries: F32  # (L, 4) as symmetry_row; no side where light may pass its faces
-    kept: (
-        Bools  # (G,) mask of the geometry's faces that are in the tables (all but panes), in order
-    )
+    kept: Bools  # (G,) mask of the geometry's faces in the tables (all but panes), in order
     notes: tuple[str, ...]  # what had to be changed or left out
 
 
