@@ -115,7 +115,12 @@ def relit(
 
 
 def _denoised_lamps(aovs: LinearAovs, layers: Mapping[int, F32]) -> dict[int, F32]:
-    return {n: denoise_radiance(layer, aovs.albedo, aovs.normal) for n, layer in layers.items()}
+    # Their sum is scaled to the denoised indoor light, so the fast network has the same error; a lone lamp is that light.
+    if len(layers) < 2:
+        return dict(layers)
+    return {
+        n: denoise_radiance(layer, aovs.albedo, aovs.normal, "fast") for n, layer in layers.items()
+    }
 
 
 def lamps_of_view(view: Path) -> list[dict[str, Any]]:

@@ -29,7 +29,6 @@ Unit = tuple[int, int]
 Place = tuple[int, int, int]
 """Epoch and position of a reader, and its reuse."""
 
-_AHEAD: Final = 2  # epochs to render ahead, from the reader's place on
 _ROUND_RAD: Final = 1e-9  # change of cameras.hfov_rad, which gives the sampler another seed
 _DAY, _DUSK = 0.6, 0.8  # cumulative shares of pictures by day and at dusk; the rest are at night
 _LEAST_DAYLIGHT: Final = 0.05  # share of a view's light that makes it bright without lamps
@@ -86,11 +85,14 @@ class StreamPlan:
         return home, (epoch + home % self.reuse) // self.reuse
 
     def ranks(self, places: Iterable[Place]) -> dict[Unit, int]:
-        """Unit -> number of units that readers use before it, the first one first."""
+        """Unit -> number of units that readers use before it, the first one first.
+
+        Reaches `reuse` epochs ahead: each home's next views, so that the renderer never idles for lack of work.
+        """
         ranks: dict[Unit, int] = {}
         for epoch, position, reuse in set(places):
             plan, ahead = replace(self, reuse=reuse), dict[Unit, None]()
-            for e in range(epoch, epoch + _AHEAD):
+            for e in range(epoch, epoch + reuse + 1):
                 homes = self.order(e)[position if e == epoch else 0 :, 0]
                 ahead |= dict.fromkeys(plan.unit(home, e) for home in dict.fromkeys(homes.tolist()))
             for rank, unit in enumerate(ahead):

@@ -30,7 +30,7 @@ from pbrs_farm.scene.home import Home
 from pbrs_farm.scene.viewpoints import Viewpoint
 from pbrs_farm.sets.stream_cache import CachedView, StreamCache, bytes_of_unit, renderer_lock
 from pbrs_farm.sets.stream_farm import Ended, fetched_views, planned_rows, submit_stream
-from pbrs_farm.sets.stream_plan import StreamHome, StreamPlan, Unit
+from pbrs_farm.sets.stream_plan import Place, StreamHome, StreamPlan, Unit
 from pbrs_farm.store import Store
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.views.stored_root import StoredRoot
@@ -67,7 +67,8 @@ class StreamRenderer:
     def __init__(self, plan: StreamPlan, cache: StreamCache) -> None:
         self._plan = plan
         self._cache = cache
-        self._ranks: Mapping[Unit, int] = {}
+        self._places: set[Place] = set()
+        self._ranks: Mapping[Unit, int] = {}  # of these places
         self._largest = 0  # bytes of a unit so far
         self._job: tuple[Store, Ended] | None = None  # on the farm
         self._labels = tuple(name for name in plan.request.layers if name != "colour")
@@ -82,13 +83,14 @@ class StreamRenderer:
             places = self._cache.places()
             if places:
                 last_s = time.monotonic()
-            if not places or not self._render_next(self._plan.ranks(places)):
+            if set(places) != self._places:
+                self._places, self._ranks = set(places), self._plan.ranks(places)
+            if not places or not self._render_next():
                 time.sleep(_LOOK_S)
 
-    def _render_next(self, ranks: Mapping[Unit, int]) -> bool:
+    def _render_next(self) -> bool:
         """Render the first missing unit, if the cache has room; True if one was rendered."""
-        self._ranks = ranks
-        for unit, rank in ranks.items():
+        for unit, rank in self._ranks.items():
             if self._cache.path(unit).exists():
                 continue
             if not self._cache.make_room(self._largest, self._distance, rank):

@@ -12,8 +12,10 @@ import pytest
 from pbrs_farm.check import verify
 from pbrs_farm.cli import main
 from pbrs_farm.core.recipe import Recipe, ToneFields, recipe_from_name
+from pbrs_farm.formats.radiance_exr import radiance_from_exr
 from pbrs_farm.images import array_from_png, exr_from_layers, layers_from_exr
 from pbrs_farm.raycast.variant import choose_variant
+from pbrs_farm.run import relight
 from pbrs_farm.run.local import run_local
 from pbrs_farm.run.local_run import Run
 from pbrs_farm.run.plan import wanted
@@ -190,6 +192,26 @@ def test_list_prints_every_lamp(view: Path, capsys: pytest.CaptureFixture[str]) 
 def test_a_list_makes_no_picture(view: Path, capsys: pytest.CaptureFixture[str]) -> None:
     assert main(["relight", str(view), "--list", "--lamp", "1=0"]) == 1
     assert "makes no picture" in capsys.readouterr().err
+
+
+def test_lamps_are_denoised_fast_and_a_lone_one_not_at_all(
+    view: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    qualities: list[str] = []
+
+    def denoise(radiance: np.ndarray, *_guides: np.ndarray) -> np.ndarray:
+        qualities.append(str(_guides[-1]))
+        return radiance
+
+    monkeypatch.setattr(relight, "denoise_radiance", denoise)
+    radiance = radiance_from_exr((view / "radiance.exr").read_bytes(), "radiance.exr")
+    rows = lamps_of(view)
+    two = relight.relight_layers(radiance, rows, denoise=True)
+    assert qualities == ["fast", "fast"]
+    one = relight.relight_layers(radiance, rows[:1], denoise=True)
+    assert len(qualities) == 2
+    np.testing.assert_array_equal(one.lamps[1], one.aovs.indoor)
+    np.testing.assert_allclose(sum(two.lamps.values()), two.aovs.indoor, rtol=1e-5)
 
 
 def test_a_lamp_without_light_is_reported(view: Path, tmp_path: Path) -> None:

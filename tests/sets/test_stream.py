@@ -85,6 +85,14 @@ def test_a_view_is_used_for_reuse_epochs_and_homes_take_turns(tmp_path: Path) ->
     assert generations[8] == [2] * 8
 
 
+def test_renderers_work_ahead_to_each_homes_next_views(tmp_path: Path) -> None:
+    small = plan(tmp_path, n_homes=4)
+    ranks = small.ranks([(8, 0, 4)])
+    assert sorted(ranks) == [(home, number) for home in range(4) for number in (2, 3)]
+    now = {small.unit(home, 8) for home in range(4)}
+    assert set(list(ranks)[:4]) == now
+
+
 def test_a_picture_is_never_without_light() -> None:
     for seed in range(300):
         draw = drawn_light(np.random.default_rng(seed), [2, 5], has_daylight=seed % 2 == 0)
