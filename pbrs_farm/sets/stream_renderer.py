@@ -80,12 +80,14 @@ class StreamRenderer:
         """Render ahead of the readers until none has lived for a while."""
         last_s = time.monotonic()
         while time.monotonic() - last_s < _END_S:
-            places = self._cache.places()
+            places = set(self._cache.places())
+            if places != self._places:
+                self._places, self._ranks = places, self._plan.ranks(places)
+            has_rendered = bool(places) and self._render_next()
+            # A unit may take longer than _END_S.
             if places:
                 last_s = time.monotonic()
-            if set(places) != self._places:
-                self._places, self._ranks = set(places), self._plan.ranks(places)
-            if not places or not self._render_next():
+            if not has_rendered:
                 time.sleep(_LOOK_S)
 
     def _render_next(self) -> bool:

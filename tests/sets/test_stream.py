@@ -7,6 +7,7 @@ import os
 import shutil
 import subprocess
 import sys
+import time
 from collections.abc import Iterable
 from dataclasses import replace
 from itertools import pairwise
@@ -28,10 +29,12 @@ from pbrs_farm.run.local import run_local
 from pbrs_farm.run.local_run import Run
 from pbrs_farm.run.plan import wanted
 from pbrs_farm.run.relight import LampFactor, RelightLayers, relit
+from pbrs_farm.sets import stream_renderer
 from pbrs_farm.sets.stream import Stream
 from pbrs_farm.sets.stream_cache import CachedView, StreamCache, bytes_of_unit
 from pbrs_farm.sets.stream_farm import fetched_views, planned_rows
 from pbrs_farm.sets.stream_plan import StreamHome, StreamPlan, drawn_light
+from pbrs_farm.sets.stream_renderer import StreamRenderer
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.transport.develop.mode_pictures import LinearAovs
 from pbrs_farm.views.stored_layers import ViewFacts
@@ -91,6 +94,25 @@ def test_renderers_work_ahead_to_each_homes_next_views(tmp_path: Path) -> None:
     assert sorted(ranks) == [(home, number) for home in range(4) for number in (2, 3)]
     now = {small.unit(home, 8) for home in range(4)}
     assert set(list(ranks)[:4]) == now
+
+
+def test_a_renderer_goes_on_after_a_unit_that_took_long(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    small, n_rendered = plan(tmp_path), 0
+    cache = StreamCache(small.folder, small.cache_bytes)
+
+    def render(_renderer: StreamRenderer) -> bool:
+        nonlocal n_rendered
+        n_rendered += 1
+        time.sleep(0.1)
+        return True
+
+    monkeypatch.setattr(stream_renderer, "_END_S", 0.05)
+    monkeypatch.setattr(StreamRenderer, "_render_next", render)
+    monkeypatch.setattr(cache, "places", lambda: [(0, 0, 4)] if n_rendered < 3 else [])
+    StreamRenderer(small, cache).serve()
+    assert n_rendered == 3
 
 
 def test_a_picture_is_never_without_light() -> None:
