@@ -305,7 +305,7 @@ class FormCase:
         return "/".join(filter(None, names))
 
     def compare(
-        self, check: str, place: str, stored: NDArray[Any], truth: Any, within: float = 0
+        self, check: str, place: str, stored: NDArray[Any], truth: Any, within: float | F64 = 0
     ) -> None:
         """Compare an array with the part's, pixel by pixel, within a tolerance."""
         shape = None if truth is None else np.shape(truth)

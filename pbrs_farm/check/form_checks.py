@@ -17,24 +17,32 @@ from pbrs_farm.check.form_truth import FormTruth, mask_from_runs
 from pbrs_farm.check.rules import judge
 from pbrs_farm.check.stored_files import stored_bytes, stored_object
 from pbrs_farm.check.stored_set import MODES, PACKED
+from pbrs_farm.check.trainer_forms import (
+    Z_UP,
+    camera_matrix,
+    covisibility,
+    metres_of_logarithms,
+    wanted_matrix,
+    whole_centres,
+)
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import NYU40_NAMES
-from pbrs_farm.images import array_from_png, layers_from_exr
+from pbrs_farm.images import array_from_png, decode_photo, layers_from_exr
 
 _FAR = 65535  # mm, and more
 _FAR_IS_NOTHING = ("yolo-depth", "marigold", "openspatial", "lingbot")
 _STRUCTURE = ("wall", "floor", "ceiling", "door", "window", "otherstructure")
 _BESIDE = {
     "coco": ("form masks",), "yolo": ("form boxes",), "yolo-seg": ("form boxes",), "yolo-semantic": ("form masks",),
-    "yolo-depth": ("form depth",), "marigold": ("form depth", "form normals"), "wai": ("form depth",), "openspatial": ("form depth",), "lingbot": ("form depth",),
-    "nerfstudio": ("form depth", "form normals"),
+    "yolo-depth": ("form depth",), "marigold": ("form depth", "form normals"), "wai": ("form depth",),
+    "openspatial": ("form depth", "form cameras"), "lingbot": ("form depth", "form cameras"),
+    "nerfstudio": ("form depth", "form normals"), "moge": ("form depth", "form normals", "form cameras"),
 }  # fmt: skip
 """Form -> checks of the files that every picture has beside it."""
 _DOCUMENTS = {"coco": ("annotations.json", "panoptic.json"), "questions": ("instances.json",)}
 _SUPER = {True: "object", False: "structure"}  # COCO's supercategories
 _NO_BOX = ("wall", "floor", "ceiling")  # of YOLO
-_Z_UP = np.array(
-    [[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]]
-)  # of nerfstudio, from y up
+_LOSS = 8.0  # mean difference of a JPEG
 _LENSES = {"pinhole": "PINHOLE", "radtan": "OPENCV", "fisheye": "OPENCV_FISHEYE", "equirect": "EQUIRECTANGULAR"}  # fmt: skip
 _OUTLINE_PX = 2  # a polygon's corners keep within this of the mask
 
@@ -48,7 +56,10 @@ def check_pictures(case: FormCase) -> None:
         shown.add(truth.view.place)
         mode = truth.mode(case.form.options.get("modes") or MODES)
         wanted = mode and truth.array(mode)
-        case.compare("form pictures", case.place(file), _array(case, file), wanted, 1)
+        if file.endswith(".jpg"):
+            _check_photo(case, file, wanted)
+        else:
+            case.compare("form pictures", case.place(file), _array(case, file), wanted, 1)
     if shown:
         _expect_views(case, shown)
     if shown and not case.form.options.get("layers"):
@@ -56,6 +67,13 @@ def check_pictures(case: FormCase) -> None:
         for check in _BESIDE.get(case.form.to, ()):
             fits = {key for _file, key in case.matching(check)} == keys
             expect(fits, f"has other views in the files of {check} than pictures")
+
+
+def _check_photo(case: FormCase, file: str, wanted: Any) -> None:
+    """A lossy picture is near the view's on the average."""
+    stored = decode_photo(stored_bytes(case.folder / file), case.place(file)).astype(np.float64)
+    fits = stored.shape == np.shape(wanted) and np.abs(stored - wanted).mean() <= _LOSS
+    case.tally.expect("form pictures", case.place(file), fits, "is another picture")
 
 
 def _views_of(case: FormCase, check: str) -> Iterator[tuple[str, FormTruth]]:
@@ -84,14 +102,21 @@ def _expect_views(case: FormCase, shown: set[str]) -> None:
 def check_depth(case: FormCase) -> None:
     """Depth of each file, in its unit."""
     for file, truth in _views_of(case, "form depth"):
-        wanted = truth.label("depth.png")
-        if case.form.to in _FAR_IS_NOTHING:
-            wanted = np.where(wanted < _FAR, wanted, 0)
-        if file.endswith((".npy", ".exr")) and truth.size is None and truth.view.has("depth_z.exr"):
-            wanted = truth.view.exr("depth_z.exr")["Z"]
-        elif file.endswith(".exr"):
-            wanted = np.where(wanted < _FAR, wanted / 1000, 0)
-        case.compare("form depth", case.place(file), _array(case, file), wanted, 1e-6)
+        place, depth = case.place(file), truth.label("depth.png")
+        metres = truth.metres(case.form.options.get("layers") or ())
+        if case.form.to == "moge":
+            stored = metres_of_logarithms(stored_bytes(case.folder / file))
+            sky = case.tally.at("form depth", place)
+            sky(np.array_equal(np.isinf(stored), depth == 0), "has another sky")
+            stored = np.where(depth > 0, stored, 0)
+            case.compare("form depth", place, stored, metres, 1e-6 + 2e-4 * metres)
+            continue
+        if file.endswith(".exr") or (file.endswith(".npy") and truth.view.has("depth_z.exr")):
+            wanted = metres
+        else:
+            is_far = (depth == _FAR) & (case.form.to in _FAR_IS_NOTHING)
+            wanted = np.where(is_far, 0, depth)
+        case.compare("form depth", place, _array(case, file), wanted, 1e-6)
 
 
 def _array(case: FormCase, file: str) -> NDArray[Any]:
@@ -110,7 +135,7 @@ def check_normals(case: FormCase) -> None:
         name = "valid" if file.endswith("_valid.png") else "normal"
         stored = _array(case, file)
         wanted = truth.array(name) if case.form.to == "released" else truth.opengl_normals()
-        if case.form.to == "nerfstudio":
+        if case.form.to in ("nerfstudio", "moge"):
             stored = np.where((stored > 0).any(-1, keepdims=True), stored * (2 / 65535) - 1, 0)
         case.compare("form normals", case.place(file), stored, wanted, 1e-4)
 
@@ -337,16 +362,70 @@ def check_frames(case: FormCase) -> None:
                 continue
             shown.add(view.place)
             facts = FormTruth(view, case.form.size).facts
-            pose = (_Z_UP @ np.array(facts["world_from_camera_opengl"])).tolist()
+            pose = (Z_UP @ np.array(facts["world_from_camera_opengl"])).tolist()
             lens = _LENSES[facts.get("lens", {}).get("model", "pinhole")]
             judge("form frame", place, case.tally, row=row, facts=facts, pose=pose)
-            judge("form frames", place, case.tally, document=document, lens=lens, turn=_Z_UP[:3].tolist(), override="none")  # fmt: skip
+            judge("form frames", place, case.tally, document=document, lens=lens, turn=Z_UP[:3].tolist(), override="none")  # fmt: skip
             for what, name in (("depth", "depth"), ("normals", "normal")):
                 beside = Path(str(row.get(f"{name}_file_path", row["file_path"]))).name
                 fits = beside == Path(row["file_path"]).name
                 case.tally.expect(f"form {what}", place, fits, f"has the {what} {beside}")
     if case.form.to == "nerfstudio":
         _expect_views(case, shown)
+
+
+def check_cameras(case: FormCase) -> None:
+    """K and poses in files of their own."""
+    for file, truth in _views_of(case, "form cameras"):
+        stored = camera_matrix(stored_bytes(case.folder / file))
+        wanted = wanted_matrix(case.form.to, file, truth.facts)
+        fits = stored.shape == wanted.shape and np.abs(stored - wanted).max() <= 1e-6
+        case.tally.expect("form cameras", case.place(file), fits, "is another camera")
+
+
+def check_wai(case: FormCase) -> None:
+    """The frames of each scene of `wai`, and the share of each that others see."""
+    shown = set[str]()
+    for file in case.files:
+        if case.form.to != "wai" or not file.endswith("/scene_meta.json"):
+            continue
+        house, document = file.partition("/")[0], stored_object(case.folder / file)
+        truths: list[FormTruth] = []
+        for row in document["frames"]:
+            name, place = row["frame_name"], f"{case.place(file)} {row['frame_name']}"
+            view = case.view(f"{house}__{name}")
+            case.tally.expect("form views", place, view is not None, "is of no kept view")
+            if view is None:
+                continue
+            shown.add(view.place)
+            truths.append(FormTruth(view, case.form.size))
+            facts = truths[-1].facts
+            k = whole_centres(np.array(facts["K"], np.float64)).tolist()
+            pose = facts["world_from_camera_opencv"]
+            judge("form frame", place, case.tally, row=row, facts=facts | {"K": k}, pose=pose)
+            names = row["image"], row["file_path"], row["depth"]
+            fits = names == (f"images/{name}.png", f"images/{name}.png", f"depth/{name}.exr")
+            case.tally.expect("form cameras", place, fits, "has the files of another view")
+        kinds = [document[n] for n in ("camera_model", "camera_convention", "scale_type")]
+        fits = kinds == ["PINHOLE", "opencv", "metric"]
+        case.tally.expect("form cameras", case.place(file), fits, f"has cameras {kinds}")
+        if len(truths) == len(document["frames"]):
+            key = document["scene_modalities"]["pairwise_covisibility"]["scene_key"]
+            _check_covisibility(case, f"{house}/{key}", truths)
+    if case.form.to == "wai":
+        _expect_views(case, shown)
+
+
+def _check_covisibility(case: FormCase, file: str, truths: list[FormTruth]) -> None:
+    """Rows of the matrix, within a thousandth; a point on a border may be on either side."""
+    stored = np.asarray(_array(case, file))
+    layers = case.form.options.get("layers") or ()
+    expect = case.tally.at("form covisibility", case.place(file))
+    if expect(stored.shape == (len(truths),) * 2, f"is {stored.shape} of {len(truths)} frames"):
+        depths: list[F64] = [truth.metres(layers) for truth in truths]
+        for row, shares in covisibility(truths, depths).items():
+            off = float(np.abs(stored[row] - shares).max())
+            expect(off <= 1e-3, f"row {row} is off by {off:.2g}")
 
 
 CHECKS = (
@@ -359,5 +438,7 @@ CHECKS = (
     Check("form classes", "form", check_class_names, 7, ("NYU40",)),
     Check("form lists", "form", check_lists, 8),
     Check("form frames", "form", check_frames, 9),
+    Check("form cameras", "form", check_cameras, 10),
+    Check("form covisibility", "form", check_wai, 11),
     Check("form licences", "form", check_licences, 30),
 )

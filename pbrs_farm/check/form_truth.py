@@ -59,7 +59,16 @@ class FormTruth:
 
     def label(self, file: str) -> NDArray[Any]:
         """A label of the nearest pixels."""
-        array = self.view.png(file)
+        return self._nearest(self.view.png(file))
+
+    def metres(self, layers: Collection[str]) -> F64:
+        """(H, W) depth, 0 for nothing; of depth_z if the view has it and `layers` (none for all) name it."""
+        if self.view.has("depth_z.exr") and (not layers or "depth_z" in layers):
+            return self._nearest(self.view.exr("depth_z.exr")["Z"]).astype(np.float64)
+        depth = self.label("depth.png")
+        return np.where(depth < np.iinfo(np.uint16).max, depth, 0) / 1000
+
+    def _nearest(self, array: NDArray[Any]) -> NDArray[Any]:
         (height, width), (full_h, full_w) = self.shape, array.shape[:2]
         rows = ((np.arange(height) + 0.5) * full_h / height).astype(int)
         columns = ((np.arange(width) + 0.5) * full_w / width).astype(int)

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 import pyarrow as pa
 import pyarrow.parquet as pq
+from PIL import Image
 
 from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.stored_set import stored_set
@@ -41,6 +42,12 @@ parts = ["views"]
 [form.questions]
 parts = ["views"]
 [form.nerfstudio]
+parts = ["views"]
+[form.wai]
+parts = ["views"]
+[form.moge]
+parts = ["views"]
+[form.openspatial]
 parts = ["views"]
 [form.hdf5]
 parts = ["views"]
@@ -224,6 +231,26 @@ def _turned(frames: dict[str, Any]) -> None:
     frames["frames"][0]["transform_matrix"][0][3] += 0.01
 
 
+def _other_pose(out: Path) -> None:
+    file = _one(out, "forms/openspatial/views/*/pose/*/*.txt")
+    pose = np.loadtxt(file)
+    pose[0, 3] += 0.01
+    np.savetxt(file, pose, "%.12g")
+
+
+def _all_covisible(out: Path) -> None:
+    file = _one(out, "forms/wai/views/*/*/covisibility/v0/*.npy")
+    np.save(file, np.ones_like(np.load(file)))
+
+
+def _nearer_logarithms(out: Path) -> None:
+    file = _one(out, "forms/moge/views/*/*/*/depth.png")
+    with Image.open(file) as image:
+        near, far, steps = image.info["near"], image.info["far"], np.array(image)
+    nearer = np.where((steps > 9) & (steps < 65535), steps - 9, steps).astype(np.uint16)
+    file.write_bytes(png_from_array(nearer, texts={"near": near, "far": far}))
+
+
 def _kept_after_all(out: Path) -> None:
     file = out / "parts/views/selection/small.jsonl"
     file.write_text(file.read_text().replace('"kept":true', '"kept":false', 1))
@@ -266,6 +293,13 @@ FALSEHOODS: dict[str, tuple[Plant, str]] = {
     "focal length of a shard": (_shard("json", _other_k), "form cameras"),
     "camera of a table": (_columns(lambda row: row.update(camera=_other_k(row["camera"].encode()).decode())), "form cameras"),
     "pose of a frame": (_json("forms/nerfstudio/views/*/*/transforms.json", _turned), "form cameras"),
+    "pose of a file": (_other_pose, "form cameras"),
+    "pose of a frame of wai": (_json("forms/wai/views/*/*/scene_meta.json", _turned), "form cameras"),
+    "centre of a picture in shares": (_json("forms/moge/views/*/*/*/meta.json", lambda d: d["intrinsics"][0].__setitem__(2, 0.49)), "form cameras"),
+    "frames that see each other": (_all_covisible, "form covisibility"),
+    "logarithmic depth": (_nearer_logarithms, "form depth"),
+    "lossy pictures of two views exchanged": (_swap("forms/moge/views/*/*/*/image.jpg"), "form pictures"),
+    "normals of two views exchanged": (_swap("forms/moge/views/*/*/*/normal.png"), "form normals"),
     "name of a class": (_json(COCO, lambda d: d["categories"][6].update(name="desk")), "form classes"),
     "name of a class of YOLO": (_text("forms/yolo/views/data.yaml", "6: table", "6: desk"), "form classes"),
     "name of a class of shards": (_json("forms/shards/views/dataset.json", lambda d: d["classes"].__setitem__(7, "desk")), "form classes"),

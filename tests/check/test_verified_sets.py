@@ -130,9 +130,9 @@ def test_a_change_of_any_field_fails(finished_set: Path, tmp_path: Path) -> None
             text = file.read_text()
             lines = text.splitlines() if file.suffix == ".jsonl" else [text]
             name = (
-                f"{form.to}/{file.name}"
-                if form.to != "nerfstudio"
-                else "nerfstudio/h/transforms.json"
+                f"{form.to}/h/{file.name}"
+                if form.to in ("nerfstudio", "wai")
+                else f"{form.to}/{file.name}"
             )
             document = json.loads(lines[0])
             for field in sorted(set(fields_of(document))):
