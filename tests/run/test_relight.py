@@ -205,7 +205,8 @@ def test_lamps_are_denoised_fast_and_a_lone_one_not_at_all(
 
     monkeypatch.setattr(relight, "denoise_radiance", denoise)
     radiance = radiance_from_exr((view / "radiance.exr").read_bytes(), "radiance.exr")
-    rows = lamps_of(view)
+    lit = next(row for row in lamps_of(view) if row["layer"])
+    rows = [{**lit, "number": number} for number in (1, 2)]
     two = relight.relight_layers(radiance, rows, denoise=True)
     assert qualities == ["fast", "fast"]
     one = relight.relight_layers(radiance, rows[:1], denoise=True)
