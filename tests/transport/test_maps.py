@@ -16,6 +16,7 @@ from pbrs_farm.core.recipe import LightFields
 from pbrs_farm.raycast.variant import choose_variant, mitsuba
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scalar_scene import ScalarScene
+from pbrs_farm.transport.scene_tables.scene_tables import tables_from_house
 from pbrs_farm.transport.scene_tables.sky import Sky, dark_sky, uniform_sky
 from pbrs_farm.transport.validation import known_rooms as rooms
 from pbrs_farm.transport.validation.claims import blocks, z_scores
@@ -147,7 +148,7 @@ def test_bumpy_matte_walls_agree_with_mitsubas_normalmap(group: Group) -> None:
     house, camera = mapped_room(roughness_texture_id=None)
     camera = rooms.camera((2.0, 2.3, 2.6), (2.0, 0.0, 2.0), 32, 24, 0.8)
     scene = LightScene.load(house, MAPS, RECIPE, uniform_sky((1, 1, 1)))
-    scalar = ScalarScene(scene.tables, scene.sky, scene.variant)
+    scalar = ScalarScene(tables_from_house(house, MAPS, RECIPE), scene.sky, scene.variant)
     fields = FIELDS.model_copy(update={"spp": 256, "pilot_spp": 4, "max_depth": 2})
     ours = [blocks(scene.render(camera, "0_0", fields, k).group(group)) for k in range(4)]
     theirs = [blocks(scalar.render(camera, group, fields, 100 + k)) for k in range(4)]
@@ -167,7 +168,7 @@ def test_bumpy_metal_of_mapped_roughness_agrees_with_mitsubas_roughconductor() -
     house, _camera = mapped_room(**metal)
     camera = rooms.camera((2.0, 2.3, 2.6), (2.0, 0.0, 2.0), 32, 24, 0.8)
     scene = LightScene.load(house, MAPS, RECIPE, uniform_sky((1, 1, 1)))
-    scalar = ScalarScene(scene.tables, scene.sky, scene.variant)
+    scalar = ScalarScene(tables_from_house(house, MAPS, RECIPE), scene.sky, scene.variant)
     fields = FIELDS.model_copy(update={"spp": 512, "pilot_spp": 4, "max_depth": 2})
     ours = np.mean([blocks(scene.render(camera, "0_0", fields, k).indoor) for k in range(4)], 0)
     theirs = np.mean([blocks(scalar.render(camera, Group.INDOOR, fields, k)) for k in range(4)], 0)
