@@ -10,6 +10,7 @@ import json
 import random
 import zlib
 from collections import Counter
+from collections.abc import Iterator
 from pathlib import Path
 from typing import Any, Final
 
@@ -31,34 +32,50 @@ _RIDGE: Final = 10.0
 _ANSWERS: Final = ("cannot be told", "left", "right", "yes", "no")
 
 
-_HOMES: Final = ("builtin", "made:70101,rooms=1")
-_N_SWAPS: Final = 8  # edited versions of a home
-_N_CAMERAS: Final = 4
+_HOMES: Final = ("builtin", "made:70101,rooms=1", "made:70102,rooms=1")
+_N_SWAPS: Final = 6  # versions of a home in which two items have changed places
+_N_CAMERAS: Final = 4  # in each of two rooms
 
 
-def render_swaps(root: Path) -> None:
-    """Render homes, and versions of them in which two items have changed places, from the same cameras."""
+def render_edits(root: Path) -> None:
+    """Render homes and edited versions of them, from the same cameras."""
     for word in _HOMES:
         home = pf.load(word, "preview")
-        cameras = [viewpoint.camera for viewpoint in home.cameras(n=_N_CAMERAS, size=(160, 120))]
-        frames = pf.render(home, cameras, modes=["opengl_dl"])
+        views = home.cameras(n=24, size=(160, 120))
+        rooms = [room for room, _n in Counter(v.room for v in views).most_common(2)]
+        cameras = [
+            v.camera for room in rooms for v in [v for v in views if v.room == room][:_N_CAMERAS]
+        ]
+        frames = pf.render(home, cameras, modes=["opengl_il"])
         frames.save(root)
         seen = Counter(row["item"] for f in frames for row in f.instances if row["pixels"] > 150)
-        items = {i.id: i for i in home.house.items if i.id in seen and not i.kind.is_structure}
-        ids = sorted(items, key=lambda name: (-seen[name], name))
-        rng = random.Random(word)
-        for _ in range(_N_SWAPS):
-            a, b = rng.sample(ids, 2)
-            by = items[b].bounds.mean(0) - items[a].bounds.mean(0)
-            by[1] = 0
-            swapped = home.move(a, by=tuple(by)).move(b, by=tuple(-by))
-            pf.render(swapped, cameras, modes=["opengl_dl"]).save(root)
+        for version in _versions(home, seen, random.Random(word)):
+            pf.render(version, cameras, modes=["opengl_il"]).save(root)
+
+
+def _versions(home: pf.Home, seen: Counter[str], rng: random.Random) -> Iterator[pf.Home]:
+    """The home with two visible items of a room swapped, with one lamp on in each room, and with its doors open."""
+    items = [i for i in home.house.items if i.id in seen and not i.kind.is_structure]
+    for _ in range(_N_SWAPS):
+        a = rng.choice(items)
+        b = rng.choice([i for i in items if i.room_id == a.room_id])
+        by = b.bounds.mean(0) - a.bounds.mean(0)
+        by[1] = 0
+        yield home.move(a.id, by=tuple(by)).move(b.id, by=tuple(-by))
+    lamps = [item for item in home.house.items if item.lights]
+    for end in (0, -1):
+        lit = {
+            [lamp.id for lamp in lamps if lamp.room_id == room][end]
+            for room in {lamp.room_id for lamp in lamps}
+        }
+        yield home.light([lamp.id for lamp in lamps if lamp.id not in lit], lm=0)
+    yield home.open([i.id for i in home.house.items if i.id in seen and i.joints], 0.8)
 
 
 def blind_figures(exports: list[Path]) -> dict[str, Any]:
     """The figures of UNITS, of folders that `pbrs-farm export --to questions` wrote."""
     rows = [
-        row | {"picture": folder / row["media"]}
+        row | {"pictures": [folder / name for name in _listed(row["media"])]}
         for folder in exports
         for row in map(json.loads, (folder / "questions.jsonl").read_text("utf-8").splitlines())
         if "pair" in row
@@ -70,6 +87,10 @@ def blind_figures(exports: list[Path]) -> dict[str, Any]:
         "questions.blind_pairs": {"words": round(by_words, 3), "colours": round(by_all, 3)},
         "questions.blind_pairs_se": round(error, 3),
     }
+
+
+def _listed(media: str | list[str]) -> list[str]:
+    return [media] if isinstance(media, str) else media
 
 
 def _score(rows: list[dict[str, Any]], *, with_colours: bool) -> tuple[float, float]:
@@ -98,7 +119,8 @@ def _features(row: dict[str, Any], *, with_colours: bool) -> NDArray[np.float64]
     )
     if not with_colours:
         return words
-    colours = _colours(row["picture"])
+    # A second picture adds its own colours, and its difference is linear in both.
+    colours = np.concatenate([_colours(file) for file in (row["pictures"] * 2)[:2]])
     kinds = np.array([float(one == a) - float(two == a) for a in _ANSWERS])
     return np.concatenate([words, np.outer(kinds, colours).ravel()])
 

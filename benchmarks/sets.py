@@ -20,7 +20,7 @@ from typing import Any, Final
 from xml.etree import ElementTree
 
 from benchmarks.blind_pairs import UNITS as UNITS_OF_PAIRS
-from benchmarks.blind_pairs import blind_figures, render_swaps
+from benchmarks.blind_pairs import blind_figures, render_edits
 from benchmarks.figures import write_report
 from benchmarks.stream_wait import UNITS as UNITS_OF_STREAM
 from benchmarks.stream_wait import stream_figures
@@ -210,11 +210,11 @@ def _questions() -> dict[str, Any]:
                 for row in csv.DictReader(file):
                     n += int(row["questions"])
                     scores[f"{name} {row['question_type']}"] = float(row["constant_score"])
-        swaps, of_swaps = Path(folder, "swaps"), Path(folder, "swaps_questions")
-        render_swaps(swaps)
-        _pbrs_farm("export", str(swaps), "--to", "questions", "--out", str(of_swaps))
-        n_wrong += len(wrong_answers(swaps, of_swaps))
-        of_pairs = blind_figures([Path(folder, "pictures_questions"), of_swaps])
+        edits, of_edits = Path(folder, "edits"), Path(folder, "edits_questions")
+        render_edits(edits)
+        _pbrs_farm("export", str(edits), "--to", "questions", "--out", str(of_edits))
+        n_wrong += len(wrong_answers(edits, of_edits))
+        of_pairs = blind_figures([Path(folder, "pictures_questions"), of_edits])
     best = [score for name, score in scores.items() if name.split()[1] in _CHOICES_OF_FOUR]
     return {
         "sets.questions": n, "sets.questions_wrong": n_wrong, "sets.blind_best": max(best),

@@ -98,7 +98,8 @@ class _Scene:
     def __init__(self, root: Path, name: str, kept: Container[tuple[str, str]] | None) -> None:
         house, _, view = name.partition("__")
         self.folder = root / "houses" / house
-        names = [view] if view else sorted(p.name for p in (self.folder / "views").iterdir())
+        views = [part.removeprefix(f"{house}__") for part in name.split("+")]
+        names = views if view else sorted(p.name for p in (self.folder / "views").iterdir())
         tables = [json.loads((self.folder / "views" / n / "view.json").read_text()) for n in names]
         if not view:
             frames = (t for t in tables if "frame" in t and "left" not in t)
@@ -106,13 +107,17 @@ class _Scene:
             tables.sort(key=lambda t: int(t["frame"]))
         self.views = tables
         self.house = json.loads((self.folder / "house.json").read_text())
-        self.home = _home(self.folder / "house.glb")
         self.rows: dict[int, dict[str, Any]] = {}
         for table in tables:
             for row in table["instances"]:
                 best = self.rows.setdefault(row["id"], row)
                 if row["fraction"] > best["fraction"]:
                     self.rows[row["id"]] = row
+
+    @property
+    def home(self) -> _Home:
+        """The meshes, read on demand."""
+        return _home(self.folder / "house.glb")
 
     def points(self, instance: int) -> Array:
         """Points on an item's surface, none farther than _SPACING_M from the next."""
@@ -133,12 +138,13 @@ class _Scene:
         """(x, z) of the middle of its box."""
         return np.array(self.rows[instance]["box3d"]["centre"])[[0, 2]]
 
-    def namesakes(self, instance: int) -> list[int]:
-        """Noticeable instances that a question would call by the same word."""
-        row = self.rows[instance]
+    def namesakes(self, instance: int, rows: dict[int, dict[str, Any]] | None = None) -> list[int]:
+        """Noticeable instances that a question would call by the same word; rows: of one picture, None = all."""
+        rows = self.rows if rows is None else rows
+        row = rows[instance]
         outside = {i["id"] for i in self.house["items"] if "outside" in i.get("tags", ())}
         return [
-            k for k, other in self.rows.items()
+            k for k, other in rows.items()
             if _word(other) == _word(row) and other["fraction"] >= _NOTICED and other["item"] not in outside
         ]  # fmt: skip
 
@@ -161,8 +167,9 @@ def wrong_answers(
     scenes: dict[str, _Scene] = {}
     pairs: dict[int, list[dict[str, Any]]] = {}
     wrong = []
-    for line in (export / "questions.jsonl").read_text("utf-8").splitlines():
-        row = json.loads(line)
+    lines = (export / "questions.jsonl").read_text("utf-8").splitlines()
+    # By home: the pairs alternate between versions of a home, whose meshes are slow to read.
+    for row in sorted(map(json.loads, lines), key=lambda row: str(row["scene_name"])):
         if row["question_type"].startswith("pair_"):
             pairs.setdefault(row["pair"], []).append(row)
         name = row["scene_name"]
@@ -190,6 +197,16 @@ def _fault(scene: _Scene, row: dict[str, Any]) -> str:
         truth = options[truth]
     if kind == "pair_hidden" and truth == "cannot be told":
         return _fault_of_hidden(scene, about)
+    if kind in ("pair_views_turn", "pair_views_moved"):
+        return _fault_of_cameras(scene, kind, truth, row["options"])
+    if kind == "pair_views_same":
+        tables = [{r["id"]: r for r in view["instances"]} for view in scene.views]
+        sizes = [len(scene.namesakes(k, rows)) for k, rows in zip(about, tables, strict=True)]
+        is_same = about[0] == about[1]
+        fits = sizes == [1, 1] and _word(tables[0][about[0]]) == _word(tables[1][about[1]])
+        return "" if fits and is_same == (truth == "yes") else f"the instances are {about}"
+    if kind == "pair_lamp":
+        return _fault_of_lamps(scene, about, truth)
     if kind != "object_counting" and any(len(scene.namesakes(k)) != 1 for k in about):
         return "a word fits more than one thing"
     if kind == "object_counting":
@@ -207,18 +224,18 @@ def _fault(scene: _Scene, row: dict[str, Any]) -> str:
     if kind == "room_visits":
         n_visits = _n_visits(scene, row["question"])
         return "" if n_visits == int(truth) else f"there are {n_visits}"
-    if kind in ("pair_lamp", "pair_open"):
-        item = scene.house["items"][about[0] - 1]
-        powers = [light["power"] for light in item["lights"]]
-        values = (
-            powers if kind == "pair_lamp" else [joint["value"] for joint in item.get("joints", ())]
-        )
-        return "" if values and (max(values) > 0) == (truth == "yes") else f"it is {values}"
+    if kind == "pair_open":
+        values = [joint["value"] for joint in scene.house["items"][about[0] - 1].get("joints", ())]
+        return "" if values and any(values) == (truth == "yes") else f"it is {values}"
     if kind in ("pair_nearer", "pair_hidden"):
         eye = np.array(scene.views[0]["world_from_camera_opencv"])[:3, 3]
         nearest = min(about, key=lambda k: float(scene.tree(k).query(eye)[0]))
         return "" if _fits(scene.rows[nearest], truth) else f"instance {nearest} is nearer"
-    if kind in ("object_rel_distance", "pair_nearest"):
+    if kind == "pair_views_nearest" and any(
+        row["id"] == about[0] and row["fraction"] >= _NOTICED for row in scene.views[0]["instances"]
+    ):
+        return f"the first picture shows instance {about[0]}"
+    if kind in ("object_rel_distance", "pair_nearest", "pair_views_nearest"):
         gaps = {_gap_m(scene, about[0], k): k for k in about[1:]}
         nearest = gaps[min(gaps)]
         return "" if _fits(scene.rows[nearest], truth) else f"instance {nearest} is nearer"
@@ -276,6 +293,30 @@ def _fault_of_hidden(scene: _Scene, about: list[int]) -> str:
     ahead = (scene.home.points(item["id"]) - pose[:3, 3]) @ pose[:3, 2]
     is_there = item["room_id"] == table["room"] and bool((ahead > 0).mean() > 0.5)
     return "" if is_there else f"instance {hidden[0]} is not in front of the camera"
+
+
+def _fault_of_cameras(scene: _Scene, kind: str, truth: str, options: list[str]) -> str:
+    """Why the cameras of two pictures are not so turned or so far apart; "" if they are."""
+    first, second = (np.array(view["world_from_camera_opencv"]) for view in scene.views)
+    if kind == "pair_views_moved":
+        apart = float(np.linalg.norm(first[:3, 3] - second[:3, 3]))
+        nearest = min((option[3:] for option in options), key=lambda o: abs(float(o[:-2]) - apart))
+        fits = nearest == truth and abs(float(truth[:-2]) - apart) <= _ROUNDING_M + _SLACK_M
+        return "" if fits else f"they are {apart:.2f} m apart"
+    angle = _angle_deg(np.zeros(2), first[[0, 2], 2], second[[0, 2], 2])
+    return "" if _is_there("side", angle, truth) else f"it turns by {angle:.0f} degrees"
+
+
+def _fault_of_lamps(scene: _Scene, about: list[int], truth: str) -> str:
+    """Why the lit one of two lamps is not on that side of the picture; "" if it is."""
+    if sorted(scene.namesakes(about[0])) != sorted(about) or len(about) != 2:
+        return "the lamps are not two"
+    left, right = sorted(about, key=lambda k: int(sum(scene.rows[k]["box2d"][::2])))
+    lit = [
+        k for k in (left, right)
+        if any(light["power"] > 0 for light in scene.house["items"][k - 1]["lights"])
+    ]  # fmt: skip
+    return "" if lit == [{"left": left, "right": right}[truth]] else f"the lit lamps are {lit}"
 
 
 def _n_visits(scene: _Scene, question: str) -> int:

@@ -25,10 +25,12 @@ def check_questions(case: FormCase) -> None:
     for row in rows:
         place = f"{case.place('questions.jsonl')} {row['id']}"
         expect = case.tally.at("questions", place)
-        expect(row["scene_name"] in scenes, f"is about {row['scene_name']}, not kept here")
+        names = row["scene_name"].split("+")
+        expect(scenes.issuperset(names), f"is about {row['scene_name']}, not kept here")
         ending = ".mp4" if "__" not in row["scene_name"] else ".png"
-        medium = f"{row['dataset']}/{row['scene_name']}{ending}"
-        expect(row["media"] == medium and medium in case.files, f"shows {row['media']}")
+        media = [f"{row['dataset']}/{name}{ending}" for name in names]
+        is_shown = row["media"] == (media if len(media) > 1 else media[0])
+        expect(is_shown and all(name in case.files for name in media), f"shows {row['media']}")
     case.tally.add("questions", len(rows))
     for line in wrong_answers(case.root, case.folder, case.kept):
         case.tally.fail("questions", case.place("questions.jsonl"), line)
@@ -65,8 +67,9 @@ def _check_copies(case: FormCase, rows: list[dict[str, Any]]) -> None:
 
 def _conversation(row: dict[str, Any]) -> dict[str, Any]:
     options, answer = row["options"] or [], row["ground_truth"]
-    kind = "video" if Path(row["media"]).suffix == ".mp4" else "image"
-    text = "\n".join([f"<{kind}>", row["question"], *options])
+    media = [row["media"]] if isinstance(row["media"], str) else row["media"]
+    kind = "video" if Path(media[0]).suffix == ".mp4" else "image"
+    text = "\n".join([f"<{kind}>"] * len(media) + [row["question"], *options])
     answer = next((f"{answer}. {o[3:]}" for o in options if o.startswith(f"{answer}. ")), answer)
     return {
         "id": f"{row['dataset']}__{row['id']}", "type": "mc" if options else "oe",

@@ -86,31 +86,38 @@ def _write_rows(questions: Sequence[Question], media: dict[str, str], out: Path)
     pq.write_table(pa.Table.from_pylist(rows, _SCHEMA), out / "questions.parquet")
     _write_lines(
         (
-            row | {"media": media[q.clip]} | q.facts()
+            row | {"media": _media_of(q, media)} | q.facts()
             for row, q in zip(rows, questions, strict=True)
         ),
         out / "questions.jsonl",
     )
     _write_lines(
-        (_conversation(k, q, media[q.clip]) for k, q in enumerate(questions)),
+        (_conversation(k, q, _media_of(q, media)) for k, q in enumerate(questions)),
         out / "conversations.jsonl",
     )
 
 
-def _conversation(number: int, question: Question, medium: str) -> dict[str, Any]:
+def _media_of(question: Question, media: dict[str, str]) -> str | list[str]:
+    """The picture or film of a question; its two pictures in a list."""
+    files = [media[name] for name in question.clip.split("+")]
+    return files if len(files) > 1 else files[0]
+
+
+def _conversation(number: int, question: Question, medium: str | list[str]) -> dict[str, Any]:
     """A training record of LLaVA and SIMS-V: the person's question and the model's answer."""
     text, answer = question.text, question.ground_truth
     if question.options:
         text = "\n".join([text, *question.options])
         answer = f"{question.ground_truth}. {question.answer}"
-    kind = "video" if medium.endswith(".mp4") else "image"
+    kind = "video" if str(medium).endswith(".mp4") else "image"
+    marks = f"<{kind}>\n" * len(question.clip.split("+"))
     return {
         "id": f"{DATASET}__{number}",
         "type": "mc" if question.options else "oe",
         "data_source": DATASET,
         kind: medium,
         "conversations": [
-            {"from": "human", "value": f"<{kind}>\n{text}", "task": question.kind},
+            {"from": "human", "value": f"{marks}{text}", "task": question.kind},
             {"from": "gpt", "value": answer},
         ],
     }

@@ -27,7 +27,7 @@ _LETTERS: Final = "ABCD"
 class Question:
     """A question with its answer, as a row of VSI-Bench, and its instances."""
 
-    clip: str
+    clip: str  # of two pictures the names, joined by "+"
     kind: str
     text: str
     ground_truth: str  # a number, or the letter of an option

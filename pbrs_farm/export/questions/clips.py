@@ -112,8 +112,9 @@ class Clip:
     views: Sequence[ChosenView]  # one, or the frames of a walk in their order
     house: House
     things: Sequence[Thing]  # all noticeable items, by instance
+    gaps: dict[tuple[int, int], float] = field(default_factory=dict, repr=False)
+    """Gaps of two instances, metres; all clips of a house have the same."""
 
-    _gaps: dict[tuple[int, int], float] = field(default_factory=dict, init=False, repr=False)
     _ways: dict[tuple[int, int], bool] = field(default_factory=dict, init=False, repr=False)
 
     @property
@@ -218,9 +219,9 @@ class Clip:
         two surfaces until they converge: exact where the items are locally convex.
         """
         key = (min(a.instance, b.instance), max(a.instance, b.instance))
-        if key not in self._gaps:
-            self._gaps[key] = _gap_m(a, b)
-        return self._gaps[key]
+        if key not in self.gaps:
+            self.gaps[key] = _gap_m(a, b)
+        return self.gaps[key]
 
 
 @dataclass(frozen=True, slots=True)
@@ -297,15 +298,22 @@ def clips_of(views: Sequence[ChosenView]) -> Iterator[Clip]:
         if house_id.startswith("object_"):
             continue
         house = stored_house(firsts[0].entry.folder.parent.parent)
+        gaps: dict[tuple[int, int], float] = {}
         walk = [view for view in firsts if view.facts.get("frame") is not None]
         if len(walk) > 1:
-            yield clip_of_views(house_id, walk, house)
+            yield clip_of_views(house_id, walk, house, gaps)
         for view in firsts:
             if len(walk) < 2 or view.facts.get("frame") is None:
-                yield clip_of_views(f"{house_id}__{view.id}", [view], house)
+                yield clip_of_views(f"{house_id}__{view.id}", [view], house, gaps)
 
 
-def clip_of_views(name: str, views: Sequence[ChosenView], house: House) -> Clip:
+def clip_of_views(
+    name: str,
+    views: Sequence[ChosenView],
+    house: House,
+    gaps: dict[tuple[int, int], float] | None = None,
+) -> Clip:
+    """gaps: those of the house already known, which the clip adds to."""
     items = {item.id: item for item in house.items}
     things: dict[int, Thing] = {}
     for k, view in enumerate(views):
@@ -319,7 +327,9 @@ def clip_of_views(name: str, views: Sequence[ChosenView], house: House) -> Clip:
             is_seen = share >= LEAST_VISIBLE and row["fraction"] >= LEAST_FRACTION
             if is_seen and thing.first_seen is None:
                 thing.first_seen = k
-    return Clip(name, views, house, [things[k] for k in sorted(things)])
+    return Clip(
+        name, views, house, [things[k] for k in sorted(things)], {} if gaps is None else gaps
+    )
 
 
 def _noticed(
