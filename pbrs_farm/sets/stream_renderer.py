@@ -83,14 +83,14 @@ class StreamRenderer:
             places = set(self._cache.places())
             if places != self._places:
                 self._places, self._ranks = places, self._plan.ranks(places)
-            has_rendered = bool(places) and self._render_next()
+            has_rendered = bool(places) and self.render_next()
             # A unit may take longer than _END_S.
             if places:
                 last_s = time.monotonic()
             if not has_rendered:
                 time.sleep(_LOOK_S)
 
-    def _render_next(self) -> bool:
+    def render_next(self) -> bool:
         """Render the first missing unit, if the cache has room; True if one was rendered."""
         for unit, rank in self._ranks.items():
             if self._cache.path(unit).exists():

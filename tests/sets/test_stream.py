@@ -109,7 +109,7 @@ def test_a_renderer_goes_on_after_a_unit_that_took_long(
         return True
 
     monkeypatch.setattr(stream_renderer, "_END_S", 0.05)
-    monkeypatch.setattr(StreamRenderer, "_render_next", render)
+    monkeypatch.setattr(StreamRenderer, "render_next", render)
     monkeypatch.setattr(cache, "places", lambda: [(0, 0, 4)] if n_rendered < 3 else [])
     StreamRenderer(small, cache).serve()
     assert n_rendered == 3
