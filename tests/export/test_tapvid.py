@@ -79,7 +79,8 @@ def test_tracks_of_views_that_are_no_film_are_refused_before_any_output() -> Non
 def kubric_film(folder: Path, depth_in: str) -> tuple[dict, np.ndarray, np.ndarray, np.ndarray]:
     """Table, pictures, planar depth and K of TAPIP3D's reader: `<name>/<name>.npy`, three digits a frame.
 
-    Stored depth is a distance between the two of depth_range, K is divided by the size.
+    Stored depth is a distance between the two of depth_range, K is divided by the size. TAPIP3D counts pixels from
+    the centre of the first one.
     """
     table = np.load(folder / f"{folder.name}.npy", allow_pickle=True).item()
     pictures = np.stack(
@@ -93,7 +94,8 @@ def kubric_film(folder: Path, depth_in: str) -> tuple[dict, np.ndarray, np.ndarr
     k[:, 0] *= pictures.shape[2]
     k[:, 1] *= pictures.shape[1]
     v, u = np.mgrid[: pictures.shape[1], : pictures.shape[2]]
-    rays = np.stack([u + 0.5, v + 0.5, np.ones(u.shape)], -1) @ np.linalg.inv(k[0]).T
+    first = 0.0 if depth_in == "frames" else 0.5
+    rays = np.stack([u + first, v + first, np.ones(u.shape)], -1) @ np.linalg.inv(k[0]).T
     return table, pictures, distance / np.linalg.norm(rays, axis=-1), k
 
 
@@ -126,7 +128,9 @@ def test_cotracker_reads_frames_tracks_depth_and_places(
             local[front, 2], tracks["depth_m"][front, t], rtol=1e-4, atol=1e-4
         )
         px = local[front] @ k[t].T
-        np.testing.assert_allclose(px[:, :2] / px[:, 2:], table["coords"][front, t], atol=0.02)
+        corner = 0.5 if reader == "tapip3d" else 0.0
+        xy = px[:, :2] / px[:, 2:] + corner
+        np.testing.assert_allclose(xy, table["coords"][front, t], atol=0.02)
     assert (tmp_path / "out/remarks.txt").read_text().startswith("films with fewer than the 24")
 
 

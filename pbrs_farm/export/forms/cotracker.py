@@ -22,6 +22,7 @@ from pbrs_farm.export.chosen_view import (
     ChosenView,
     depth_metres,
     intrinsics_of,
+    k_of_whole_centres,
     require_lens,
 )
 from pbrs_farm.export.form import REMARKS, Convention, ViewForm, name_left_out, write_file
@@ -39,7 +40,7 @@ class CoTrackerOptions(Record):
 
     reader: str = option(
         "cotracker",
-        "tapip3d: depth beside the frames, as TAPIP3D reads it; CoTracker takes every file there for a frame",
+        "tapip3d: depth beside the frames and its K, as TAPIP3D reads them; CoTracker takes every file there for a frame",
         choices=("cotracker", "tapip3d"),
     )
 
@@ -49,8 +50,8 @@ def write_cotracker(views: list[ChosenView], out: Path, choice: Choice) -> None:
 
     <house>.npy is a pickled table: coords (N, T, 2) px from the picture's corner, visibility and occluded (N, T),
     both True where hidden (CoTracker inverts visibility), traj_3d (N, T, 3) in the home's world, intrinsics
-    (T, 3, 3) over the picture's size, matrix_world (T, 4, 4) from OpenGL's camera axes, depth_range. A depth of
-    16 bit is the distance along the ray between these two; the sky is at the far one. A point behind the camera has
+    (T, 3, 3) over the picture's size (for TAPIP3D of pixels whose centres are whole numbers, as its loader counts
+    them), matrix_world (T, 4, 4) from OpenGL's camera axes, depth_range. A depth of 16 bit is the distance along the ray between these two; the sky is at the far one. A point behind the camera has
     the place of the nearest frame with it in front. remarks.txt names films below 24 frames. BadInput without a
     film, without tracks.npz, and above 999 frames.
     """
@@ -83,16 +84,19 @@ def _write_film(folder: Path, house: str, frames: list[ChosenView], reader: str)
         share = np.where(distance > 0, (distance - near) / (far - near), 1)
         png = png_from_array(np.rint(share * 65535).astype(np.uint16))
         write_file(folder / f"{beside}/{number:03d}_depth.png", png)
-    table = _table(frames) | {"depth_range": np.array([near, far], np.float32)}
+    table = _table(frames, reader) | {"depth_range": np.array([near, far], np.float32)}
     np.save(folder / f"{house}.npy", np.array(table, object), allow_pickle=True)
 
 
-def _table(frames: list[ChosenView]) -> dict[str, NDArray[Any]]:
+def _table(frames: list[ChosenView], reader: str) -> dict[str, NDArray[Any]]:
     tracks, facts = film_tracks(frames), frames[0].facts
     size = np.array([facts["width_px"], facts["height_px"]], np.float64)
     coords, occluded = tracks["points"] * size, tracks["occluded"]
     over_size = np.array([[1 / size[0]], [1 / size[1]], [1.0]])
-    intrinsics = [np.array(view.facts["K"], np.float64) * over_size for view in frames]
+    ks = [view.facts["K"] for view in frames]
+    if reader == "tapip3d":
+        ks = [k_of_whole_centres(k) for k in ks]
+    intrinsics = [np.array(k, np.float64) * over_size for k in ks]
     poses = [np.array(view.facts["world_from_camera_opengl"], np.float64) for view in frames]
     return {
         "coords": coords.astype(np.float32),
