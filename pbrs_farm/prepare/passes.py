@@ -320,7 +320,7 @@ PASSES: Final = (
     Pass("read", 13, _read, lambda _source, _recipe: True, _read_depends),
     Pass("stand-ins", 4, _stand_in, _has_stand_ins, _stand_ins_depend),
     Pass("furnish", GENERATE_VERSION + _FURNISH_VERSION, _furnish, _is_furnished, _furnish_depends),
-    Pass("dress", 16, _dress, _is_dressed, _dress_depends),
+    Pass("dress", 17, _dress, _is_dressed, _dress_depends),
     Pass("repair", 6, _repair, _is_home, _repair_depends),
     Pass("open", 2, _leave_open, _stands_open, _open_depends),
     Pass("float", 2, _float, _has_floating_things, _float_depends),

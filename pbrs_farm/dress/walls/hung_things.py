@@ -76,7 +76,10 @@ _PROFILES: Final[dict[str, tuple[tuple[float, float], ...]]] = {
 }
 # fmt: on
 _MOUNTS: Final = ("none", "none", "mat", "mat", "double mat", "lip", "float")
-_RELIEF_M: Final = 0.006  # from the front of a frame back to its print
+_RELIEF_M: Final = 0.006  # from the front of a frame back to its print or mount
+_BEHIND_M: Final = {"lip": 0.002, "mat": 0.002, "double mat": 0.004, "float": 0.004}
+"""From the front of a mount to what is behind it."""
+_BACK_M: Final = 0.001  # from the wall to the card behind a print
 
 
 def ring(
@@ -105,6 +108,7 @@ def framed(
         parts += [(b, frame) for b in _corner_blocks(low, high, frame_m, depth)]
     # The inner edge of a moulding may lie below its front.
     z = depth * _PROFILES[kind][-2][1] - _RELIEF_M
+    z = max(z, 2 * _BACK_M + _BEHIND_M.get(mount, 0.0))
     low, high = low + frame_m, high - frame_m
     white = plain("mat", (0.93, 0.92, 0.89), 0.9)
     mat = float(rng.uniform(0.1, 0.17)) * min(width, height)
@@ -116,10 +120,10 @@ def framed(
             parts.append((ring("mat", low, high, mat, z), card))
             low, high, z, mat = low + mat - 0.002, high - mat + 0.002, z - 0.002, 0.008
     elif mount == "float":
-        face, back = faced_slab("card", low, high, (0.001, z - 0.004))
+        face, back = faced_slab("card", low, high, (_BACK_M, z - 0.004))
         parts += [(face, white), (back, white)]
         low, high = low + 0.6 * mat, high - 0.6 * mat
-    face, back = faced_slab("print", low, high, (0.001, z))
+    face, back = faced_slab("print", low, high, (_BACK_M, z))
     parts += [(face, _printed(print_)), (back, plain("card", (0.6, 0.52, 0.42), 0.9))]
     return hanging_piece("framed_picture", "picture_frame", PICTURE, parts, [print_])
 

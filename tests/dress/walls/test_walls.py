@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from itertools import pairwise
 
 import numpy as np
 import pytest
@@ -151,6 +152,22 @@ def test_pictures_hang_in_many_frames() -> None:
         assert piece.size[0] == pytest.approx(0.5)
         counts[str(sorted(len(s.faces) for s in shape.surfaces))] += 1
     assert effective(counts) > 12
+
+
+@pytest.mark.parametrize("depth_m", [0.018, 0.032])
+def test_a_print_is_before_its_back_in_any_frame_and_mount(
+    depth_m: float, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    texture = hung_things.jpeg_texture("t", np.zeros((8, 8, 3), np.uint8))
+    monkeypatch.setattr(hung_things, "_moulding", lambda _rng, _short: (0.03, depth_m))
+    for seed in range(200):
+        rng = np.random.default_rng(seed)
+        _piece, shape = hung_things.framed(rng, _style(), 0.5, 0.7, texture, Material("frame"))
+        assert shape.bounds[0, 2] == 0.0
+        for face, back in pairwise(shape.surfaces):
+            if back.name == f"{face.name} back":
+                depths = back.positions[:, 2]
+                assert face.positions[:, 2].min() == depths.max() > depths.min() + 0.0009
 
 
 def test_a_framed_print_shows_its_picture_upright_and_its_faces_outward() -> None:
