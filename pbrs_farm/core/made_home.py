@@ -10,7 +10,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.number_ranges import range_of
 
 PREFIX: Final = "made:"
-VERSION: Final = 14
+VERSION: Final = 15
 """Of the generator: part of a made home's id. Raised when it makes another home of a seed."""
 
 STREAM: Final = 11

@@ -22,6 +22,7 @@ from pbrs_farm.geometry.solids import Triple, boxes_surface, lathe
 _FRAME_M: Final = 0.06  # breadth of a frame's posts
 _LEAF_M: Final = 0.04  # thickness of a door's leaf
 _PANEL_M: Final = 0.006  # protrusion of a panel, metres
+_STEP_M: Final = 0.003  # of a second board on it: the hinges at the leaf's face allow 10 mm in all
 _GAP_M: Final = 0.003  # around a leaf
 _STOP_M: Final = 0.015  # how far the stop behind a leaf reaches into the opening
 _STOP_DEPTH_M: Final = 0.012
@@ -313,7 +314,7 @@ def _door_leaf_boxes(
         if moulding == "stepped" and not is_board:
             left, low, right, high = field
             m = min(0.03, (right - left) / 4)
-            add(boxes, (left + m, low + m, right - m, high - m), 2 * _PANEL_M)
+            add(boxes, (left + m, low + m, right - m, high - m), _PANEL_M + _STEP_M)
     return boxes, panes
 
 

@@ -31,7 +31,7 @@ if TYPE_CHECKING:
     from pbrs_farm.dress.report import DressReport
     from pbrs_farm.repair import RepairReport
 
-PLANS_VERSION: Final = 3
+PLANS_VERSION: Final = 4
 """Version of the readers of floor plans; raising it invalidates no other homes."""
 _MAX_ROUNDS: Final = (
     3  # maximum rounds of repairing a dressed house and rehanging items that lost their wall

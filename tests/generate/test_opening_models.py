@@ -12,6 +12,7 @@ from pbrs_farm.generate.opening_models import (
     HANDLES,
     LEAVES,
     LIGHTS,
+    MOULDINGS,
     SASHES,
     OpeningDesign,
     opening_model,
@@ -35,6 +36,18 @@ def test_no_light_comes_round_a_shut_leaf(leaf: str, kind: OpeningKind, gap_m: f
     open_part = shapely.box(-WIDTH / 2, 0.0, WIDTH / 2, HEIGHT).difference(covered.buffer(1e-5))
     assert open_part.area == pytest.approx(gap_m * WIDTH, rel=0.2, abs=1e-4)
     assert open_part.is_empty or open_part.bounds[3] <= gap_m + 1e-4
+
+
+@pytest.mark.parametrize("moulding", MOULDINGS)
+@pytest.mark.parametrize("wall_m", [0.05, 0.1, 0.26, 0.5])
+def test_a_leaf_hangs_at_the_face_to_which_it_opens(moulding: str, wall_m: float) -> None:
+    for kind in LEAVES:
+        for at_start in (False, True):
+            door = PlanOpening(OpeningKind.DOOR, 0, 1.0, WIDTH, HEIGHT, 0.0, 0, None, at_start)
+            shape = opening_model(door, wall_m, OpeningDesign(leaf=kind, moulding=moulding))
+            (leaf,) = (s for s in shape.surfaces if s.name == "leaf")
+            ahead = leaf.positions[:, 2].max() - shape.joints[0].point[2]
+            assert -0.004 <= ahead <= 0.0095, kind
 
 
 @pytest.mark.parametrize("sash", SASHES)
