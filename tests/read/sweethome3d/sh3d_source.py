@@ -47,12 +47,11 @@ def home_xml(body: str, attributes: str = "wallHeight='250'", *, room: str = ROO
 
 
 def sh3d(xml: bytes, contents: dict[str, bytes] | None = None) -> bytes:
-    """A .sh3d archive."""
+    """A .sh3d archive; the same bytes at any time, since the home's number and cameras follow them."""
     stream = io.BytesIO()
-    with zipfile.ZipFile(stream, "w", zipfile.ZIP_DEFLATED) as archive:
-        archive.writestr("Home.xml", xml)
-        for name, data in (contents or {}).items():
-            archive.writestr(name, data)
+    with zipfile.ZipFile(stream, "w") as archive:
+        for name, data in {"Home.xml": xml, **(contents or {})}.items():
+            archive.writestr(zipfile.ZipInfo(name), data, zipfile.ZIP_DEFLATED)
     return stream.getvalue()
 
 
