@@ -14,6 +14,7 @@ from pbrs_farm.core.picture_cameras import PictureCamera
 from pbrs_farm.core.recipe import SensorFields, ToneFields
 
 _MITSUBA_LUMINANCE = np.array([0.212671, 0.715160, 0.072169])
+SAME_LEVEL = 1e-5  # relative: levels nearer to each other are one
 
 
 def finite_light(light: NDArray[Any]) -> F64:
@@ -36,26 +37,26 @@ def add_glare(total: F32, share: float) -> F32:
 
 
 def white_balance(
-    total: NDArray[Any], albedo: NDArray[Any], tone: ToneFields, *, least: float = 1.0
+    total: NDArray[Any], albedo: NDArray[Any], tone: ToneFields, *, margin: float = SAME_LEVEL
 ) -> F64:
     """(3,) gains of constant luminance against the median of radiance over albedo where it is high.
 
-    least: relative to the median level, from which a pixel counts.
+    margin: relative, by which a pixel's level may be outside of the range that counts.
     """
     errors = 2.0 ** np.array([tone.warmth_ev / 2, tone.tint_ev, -tone.warmth_ev / 2])
     light = np.ones(3)
     is_lit = (albedo > 0.02).all(axis=-1) & (total > 0).all(axis=-1)
     if tone.white_balance > 0 and is_lit.sum() >= 16:
-        light = _light_colour(total[is_lit], albedo[is_lit].astype(np.float64), least)
+        light = _light_colour(total[is_lit], albedo[is_lit].astype(np.float64), margin)
     gains = (light / (light @ LUMINANCE)) ** -tone.white_balance * errors
     return np.asarray((gains / (gains @ LUMINANCE)).astype(np.float32))
 
 
-def _light_colour(total: NDArray[Any], surface: F64, least: float) -> F64:
+def _light_colour(total: NDArray[Any], surface: F64, margin: float) -> F64:
     """(3,) median of (N, 3) radiance over albedo between the middle and the 95th percentile."""
     level = (total / surface) @ LUMINANCE
     low, high = np.percentile(level, [50, 95])
-    lit = (level >= low * least) & (level <= high)
+    lit = (level >= low * (1 - margin)) & (level <= high * (1 + margin))
     total, surface = total[lit], surface[lit]
     logs = np.median(np.log(total / surface), axis=0)
     # Walls of one hue colour the light between them: clip it to the range of lamps and skies.

@@ -15,6 +15,7 @@ from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.checks import Check
 from pbrs_farm.check.denoised_light import Planes, stored_light
 from pbrs_farm.check.developing import (
+    SAME_LEVEL,
     add_glare,
     exposure_of,
     finite_light,
@@ -152,8 +153,9 @@ class _Shot:
         gains = white_balance(total, albedo, tone)
         is_stated = stated_gains.shape == (3,) and "exposure" in stated
         if is_stated and np.abs(stated_gains - gains).max() > slack:
-            # Half the picture may be a sky of one level, which counts or not by rounding.
-            either = [white_balance(total, albedo, tone, least=1 + s) for s in (-tie, tie)]
+            # Much of the picture may have one level at the margin, which counts or not by rounding.
+            margins = (SAME_LEVEL - tie, SAME_LEVEL + tie)
+            either = [white_balance(total, albedo, tone, margin=m) for m in margins]
             gains = min(either, key=lambda g: float(np.abs(stated_gains - g).max()))
         exposure = exposure_of(finite_light(total * gains), tone)
         expect = self.case.expect("light developed", self.file)

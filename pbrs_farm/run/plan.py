@@ -53,7 +53,7 @@ STEPS: Final = {
         Step("illuminance", 10, ("house",), per_view=False),
         # Every change of illuminance also changes light's digest, so it is not listed in `after`.
         Step("light", 30, ("house", "cameras"), needs=("illuminance",)),
-        Step("develop", 8, ("light",), needs=("light",)),
+        Step("develop", 9, ("light",), needs=("light",)),
         Step("view", 4, _VIEW_READS, needs=("truth",)),
     )
 }

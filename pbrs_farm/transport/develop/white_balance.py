@@ -12,6 +12,8 @@ from pbrs_farm.core.frames import LUMINANCE
 from pbrs_farm.core.recipe import ToneFields
 
 _LIT_PERCENTILES: Final = (50, 95)  # of irradiance: pixels that tell the light's colour
+# Relative: a sky of one level fills half of some views, and differs from itself in the last bits.
+_SAME_LEVEL: Final = 1e-5
 _SATURATED: Final = 0.35  # (max - min) / max of an albedo from which it is a colour
 _SAME_HUE_COS: Final = 0.9  # of the angle between two chroma vectors
 _FILLED: Final = 0.5  # share of pixels from which one colour fills a view
@@ -56,7 +58,8 @@ def _illuminant(radiance: RadianceImage, albedo: RadianceImage) -> F32 | None:
     light = [c / s for c, s in zip(radiances, surface, strict=True)]
     level = sum(c * w for c, w in zip(light, LUMINANCE.astype(np.float32), strict=True))
     low, high = np.percentile(level, _LIT_PERCENTILES)
-    lit = np.flatnonzero((level >= low) & (level <= high))
+    is_lit = (level >= low * (1 - _SAME_LEVEL)) & (level <= high * (1 + _SAME_LEVEL))
+    lit = np.flatnonzero(is_lit)
     colour = np.exp(np.array([np.median(np.log(c[lit])) for c in light], np.float32))
     is_filled = _one_colour_fills(np.stack([c[lit] for c in surface], -1))
     return _clamp_to_lamps_and_skies(colour) if is_filled else colour

@@ -1,10 +1,13 @@
-"""The white balance of views filled by one colour."""
+"""The white balance of views filled by one colour, or by a sky of one level."""
 
 from __future__ import annotations
+
+from collections.abc import Callable
 
 import numpy as np
 import pytest
 
+from pbrs_farm.check import developing
 from pbrs_farm.core.recipe import ToneFields
 from pbrs_farm.transport.develop.white_balance import white_balance
 
@@ -40,3 +43,19 @@ def test_colours_of_many_hues_fill_no_view() -> None:
     green = np.array([0.3, 1.0, 0.3], np.float32)
     gains = white_balance(albedo * green, albedo, ToneFields(white_balance=1.0))
     np.testing.assert_allclose(gains / gains[1], [1 / 0.3, 1, 1 / 0.3], rtol=1e-3)
+
+
+@pytest.mark.parametrize("gains_of", [white_balance, developing.white_balance])
+def test_the_last_bits_of_a_sky_do_not_change_the_colours(
+    gains_of: Callable[..., np.ndarray],
+) -> None:
+    light = np.full((24, 32, 3), (3.9, 4.1, 4.6), np.float32)
+    light[16:] = np.random.default_rng(2).uniform(5, 9, (8, 32, 1)) * (1.3, 1, 0.5)
+    albedo = np.ones_like(light)
+    bits = np.random.default_rng(3).integers(-2, 3, (16, 32, 3))
+    noisy = light.copy()
+    noisy[:16] = (light[:16].view(np.int32) + bits.astype(np.int32)).view(np.float32)
+    fields = ToneFields(white_balance=0.7)
+    np.testing.assert_allclose(
+        gains_of(noisy, albedo, fields), gains_of(light, albedo, fields), atol=2e-6
+    )
