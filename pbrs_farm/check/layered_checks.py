@@ -1,12 +1,14 @@
 """All surfaces along the straight rays of some pixels against depth_layers; no effects.
 
 Every crossing of a ray is collected with its triangle. Stored surfaces must be crossings in their order, and each
-crossing before the last of them must be stored or within 0.1 mm of a stored one. Where a ray grazes an edge, rays at
-most 0.02 px away are tried; where triangles coincide, all triangles of the stored instances.
+crossing before the last of them must be stored or within 0.1 mm of a stored one or of a hole: a caster that steps
+behind a hole may miss it. Where a ray grazes an edge, rays at most 0.02 px away are tried; where triangles coincide,
+all triangles of the stored instances.
 """
 
 from __future__ import annotations
 
+import itertools
 from typing import NamedTuple
 
 import numpy as np
@@ -14,7 +16,7 @@ import numpy as np
 from pbrs_farm.check.axes import dot
 from pbrs_farm.check.cases import ViewCase
 from pbrs_farm.check.checks import Check
-from pbrs_farm.check.embree_caster import Hits
+from pbrs_farm.check.embree_caster import Hits, Rays
 from pbrs_farm.check.pixel_checks import distances_pierced
 from pbrs_farm.core.arrays import F64, I64, Bools
 
@@ -26,9 +28,6 @@ _STEP = 1e-5  # behind a crossing, relative to the largest coordinate plus 1 m
 _APART_MM = 0.1  # along the ray: nearer surfaces are one
 _ROUNDING_MM, _SLANT_MM, _MOST_SLANT_MM = 0.505, 2e-3, 5.0
 _SATURATED_MM = 65535
-_MOST_TRIED = (
-    1000  # pixels, or a twentieth, for which every triangle of the stored instances is asked
-)
 _JITTER_PX = 0.02 * np.array([[0, 0], [1, 0], [-1, 0], [0, 1], [0, -1], [1, 1], [-1, -1]])
 
 
@@ -57,19 +56,23 @@ def check_depth_layers(case: ViewCase) -> None:
         return
     stored = _Surfaces(*(case.arrays[name][rows, columns].astype(np.float64) for name in _LAYERS))
     origin, directions = case.view.rays(rows, columns)
-    right = np.zeros(len(rows), bool)
-    for dx, dy in _JITTER_PX:
+    right, n_certain = np.zeros(len(rows), bool), 0
+    for is_doubled, (dx, dy) in itertools.product((False, True), _JITTER_PX):
         # A ray that grazes an edge is judged by those beside it.
         k = np.nonzero(~right)[0]
-        faces = _crossed_faces(case.scene.rays, *case.view.rays(rows[k] + dy, columns[k] + dx))
-        right[k] = _explained(case, stored.some(k), faces, origin, directions[k])
-        if (dx, dy) == (0, 0):
-            ties = ~right
-    for one in np.nonzero(~right)[0][: max(_MOST_TRIED, len(rows) // 20), None]:
-        k = one[0]
-        faces = _pierced_faces(case, stored.instance[k], origin, directions[k])
-        right[one] = _explained(case, stored.some(one), faces[None], origin, directions[one])
-    case.tally.add(check, len(rows), ties=int((ties & right).sum()))
+        if not len(k):
+            break
+        beside = case.view.rays(rows[k] + dy, columns[k] + dx)[1]
+        faces = _crossed_faces(case.now.rays, origin, beside)
+        if is_doubled:
+            faces = _with_doubles(case, faces, stored.some(k), origin, beside)
+        fits, missed_mm = _compared(case, stored.some(k), faces, origin, directions[k])
+        right[k] = fits & ~missed_mm.any(1)
+        if dx == dy == 0 and is_doubled:
+            right[k] |= _explained_by_holes(case, stored.some(k), faces, origin, beside)
+        elif dx == dy == 0:
+            n_certain = int(right.sum())
+    case.tally.add(check, len(rows), ties=int(right.sum()) - n_certain)
     for row, column in zip(rows[~right], columns[~right], strict=True):
         case.tally.fail(check, case.place, f"row {row}, column {column}")
 
@@ -91,13 +94,55 @@ def _crossed_faces(rays: Hits, origin: F64, directions: F64) -> I64:
     return faces
 
 
-def _pierced_faces(case: ViewCase, instances: F64, origin: F64, direction: F64) -> I64:
-    """(K,) the triangles that a ray crosses: its own, and all of some instances that it pierces."""
-    triangles, rays = case.now.triangles, case.now.rays
-    some = np.nonzero(np.isin(triangles.instance, instances[instances > 0]))[0]
-    pierced = some[np.isfinite(distances_pierced(triangles, some, origin, direction))]
-    pierced = rays.without_holes(pierced, origin, np.broadcast_to(direction, (len(pierced), 3)))
-    return np.union1d(pierced, _crossed_faces(rays, origin, direction[None])[0])
+def _with_doubles(
+    case: ViewCase, faces: I64, stored: _Surfaces, origin: F64, directions: F64
+) -> I64:
+    """(N, K) faces and those that the rays cross among the triangles of each stored surface's kind alone."""
+    triangles = case.now.triangles
+    doubles = np.full((len(faces), _MOST, _CROSSINGS), -1, np.int64)
+    kinds = np.stack([stored.instance, stored.clear], axis=2)
+    for instance, clear in np.unique(kinds[stored.depth_mm > 0], axis=0):
+        numbers = np.nonzero(triangles.instance == instance)[0]
+        item = triangles.only(int(instance))
+        rays = Rays(item, item.see_through == (clear > 0))
+        is_kind = (kinds == (instance, clear)).all(2) & (stored.depth_mm > 0)
+        some = np.nonzero(is_kind.any(1))[0]
+        crossed = _crossed_faces(rays, origin, directions[some])
+        crossed[crossed >= 0] = numbers[crossed[crossed >= 0]]
+        doubles[some, is_kind[some].argmax(1)] = crossed
+    faces = -np.sort(-np.concatenate([faces, doubles.reshape(len(faces), -1)], axis=1), axis=1)
+    faces[:, 1:][faces[:, 1:] == faces[:, :-1]] = -1
+    last = np.flatnonzero((faces >= 0).any(0)).max(initial=0)
+    return np.asarray(faces[:, : last + 1])
+
+
+def _explained_by_holes(
+    case: ViewCase, stored: _Surfaces, faces: I64, origin: F64, directions: F64
+) -> Bools:
+    """(N,) True where the rays pass a hole within 0.1 mm of each surface that the faces (N, K) have too much.
+
+    All triangles with holes are asked, as rays that step behind a hole miss the next surface.
+    """
+    triangles, rays, right = case.now.triangles, case.now.rays, np.zeros(len(faces), bool)
+    sheets = np.nonzero(triangles.has_holes)[0]
+    corners = triangles.vertices[triangles.faces[sheets]].astype(np.float64) - origin
+    middle = corners.mean(1)
+    radius = np.linalg.norm(corners - middle[:, None], axis=2).max(1, initial=0)
+    for k in range(len(faces)) if len(sheets) else ():
+        direction = directions[k]
+        length = np.linalg.norm(direction)
+        off_ray_m = np.linalg.norm(np.cross(middle, direction), axis=1) / length
+        near = sheets[off_ray_m <= radius]
+        distance = distances_pierced(triangles, near, origin, direction)
+        near, distance = near[np.isfinite(distance)], distance[np.isfinite(distance)]
+        along = np.broadcast_to(direction, (len(near), 3))
+        is_solid = rays.without_holes(near, origin, along) >= 0
+        crossed = np.union1d(faces[k], near[is_solid])[None]
+        one = np.array([k])
+        fits, missed_mm = _compared(case, stored.some(one), crossed, origin, directions[one])
+        gaps_mm = np.abs(missed_mm[missed_mm > 0, None] - 1000 * distance[~is_solid]) * length
+        right[k] = fits[0] and (gaps_mm <= _APART_MM).any(1).all()
+    return right
 
 
 def _surfaces_of(case: ViewCase, faces: I64, origin: F64, directions: F64) -> tuple[_Surfaces, F64]:
@@ -125,10 +170,10 @@ def _surfaces_of(case: ViewCase, faces: I64, origin: F64, directions: F64) -> tu
     return _Surfaces(*sorted_[:4]), _ROUNDING_MM + sorted_[4]
 
 
-def _explained(
+def _compared(
     case: ViewCase, stored: _Surfaces, faces: I64, origin: F64, directions: F64
-) -> Bools:
-    """(N,) True where stored surfaces are the crossings of rays with faces (N, K)."""
+) -> tuple[Bools, F64]:
+    """(N,) True where stored surfaces are crossings of rays with faces (N, K), and depths (N, K) not stored, or 0."""
     crossed, tolerance_mm = _surfaces_of(case, faces, origin, directions)
     length = np.linalg.norm(directions, axis=1)
     is_stored, is_crossed = stored.depth_mm > 0, crossed.depth_mm > 0
@@ -147,7 +192,7 @@ def _explained(
         last = np.where(fits.any(1), fits.argmax(1), last)
     end = np.where(is_stored.all(1), stored.depth_mm[:, -1], np.inf)
     is_before = is_crossed & (crossed.depth_mm < end[:, None] - tolerance_mm)
-    return np.asarray(right & ~(is_before & ~near).any(1))
+    return np.asarray(right), np.where(is_before & ~near, crossed.depth_mm, 0.0)
 
 
 CHECKS = (
