@@ -439,6 +439,6 @@ CHECKS = (
     Check("form lists", "form", check_lists, 8),
     Check("form frames", "form", check_frames, 9),
     Check("form cameras", "form", check_cameras, 10),
-    Check("form covisibility", "form", check_wai, 11),
+    Check("form covisibility", "form", check_wai, 12),
     Check("form licences", "form", check_licences, 30),
 )

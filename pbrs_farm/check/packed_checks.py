@@ -215,4 +215,4 @@ def _check_facts(
     case.tally.expect("form boxes", place, fits, "has other instances than the view")
 
 
-CHECKS = (Check("packed forms", "form", check_packed, 10, ("NYU40",)),)
+CHECKS = (Check("packed forms", "form", check_packed, 11, ("NYU40",)),)
