@@ -12,9 +12,8 @@ import pytest
 from pbrs_farm.check import layered_checks, verify
 from pbrs_farm.check.certificate import Count
 from pbrs_farm.core.house import House
+from tests.check.perforated_homes import MATERIALS, screen, screened, with_frame_in_wall
 from tests.check.roots import make_root, views_of
-from tests.check.test_cutouts import MATERIALS, screen, screened
-from tests.check.test_verified_geometry import with_frame_in_wall
 
 pytestmark = pytest.mark.quick(2)
 

@@ -8,9 +8,9 @@ import pytest
 import pbrs_farm as pf
 from pbrs_farm.check import verify
 from pbrs_farm.core.camera import Camera, Intrinsics
-from pbrs_farm.core.house import House, ItemKind, Surface
 from pbrs_farm.images import array_from_png, png_from_array
 from pbrs_farm.read.builtin.builtin_home import builtin_home
+from tests.check.perforated_homes import with_frame_in_wall
 from tests.check.roots import SIZE, changed_pixel, edit_table, failed, house_of, make_root, sign
 from tests.scene.homes import can, crate, small_home
 
@@ -96,31 +96,6 @@ def test_normals_in_another_frame_do_not_fit_the_depth(root):
     replaced(view / "normal.png", lambda normal: np.ascontiguousarray(normal[..., [0, 2, 1]]))
     sign(root, house_of(root))
     assert verify(root, sample=0).counts["depth on planes"].failed > 1000
-
-
-def with_frame_in_wall(by_m: float) -> House:
-    """The small home with a sheet in front of every wall's larger faces, by_m off their plane."""
-    home = builtin_home()
-    frames = []
-    for item in home.items:
-        if item.kind is not ItemKind.WALL:
-            continue
-        surfaces = []
-        for s in item.surfaces:
-            corners = s.positions[s.faces].astype(np.float64)
-            normals = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
-            normals /= np.maximum(np.linalg.norm(normals, axis=1, keepdims=True), 1e-12)
-            upright = np.abs(normals[:, 1]) < 0.1
-            # Smaller triangles about the same middle, each in its plane.
-            middle = corners.mean(1, keepdims=True)
-            small = (middle + 0.8 * (corners - middle) + by_m * normals[:, None])[upright]
-            faces = np.arange(3 * len(small)).reshape(-1, 3).astype(np.int32)
-            surfaces.append(
-                Surface("frame", small.reshape(-1, 3).astype(np.float32), faces, s.material)
-            )
-        frame = replace(item, id=f"frame_{item.id}", name="frame", kind=ItemKind.WINDOW, nyu40=9, surfaces=tuple(surfaces), tags=())  # fmt: skip
-        frames.append(frame)
-    return home.with_items([*frames, *home.items])
 
 
 @pytest.mark.long

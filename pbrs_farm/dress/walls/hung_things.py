@@ -99,7 +99,7 @@ def framed(
     frame: Material,
 ) -> Model:
     """A print behind one of nine mouldings and in one of five mounts; outer size in metres."""
-    frame_m, depth = _moulding(rng, min(width, height))
+    frame_m, depth = moulding_size(rng, min(width, height))
     kinds = list(_PROFILES)[: 4 if frame_m < 0.02 else None]
     kind, mount = str(rng.choice(kinds)), str(rng.choice(_MOUNTS))
     low, high = np.array([-width / 2, 0.0]), np.array([width / 2, height])
@@ -271,7 +271,7 @@ def clock(diameter: float, dial: Texture, frame: Material, form: int = 0, marks:
     return hanging_piece("clock", "clock", OTHERPROP, parts, [dial])
 
 
-def _moulding(rng: np.random.Generator, short: float) -> tuple[float, float]:
+def moulding_size(rng: np.random.Generator, short: float) -> tuple[float, float]:
     # Width and depth of the frame: small pictures have slim ones.
     wide = rng.random() < 0.25
     frame_m = float(rng.uniform(0.03, 0.05) if wide else rng.uniform(0.012, 0.024))

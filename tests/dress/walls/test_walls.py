@@ -159,7 +159,7 @@ def test_a_print_is_before_its_back_in_any_frame_and_mount(
     depth_m: float, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     texture = hung_things.jpeg_texture("t", np.zeros((8, 8, 3), np.uint8))
-    monkeypatch.setattr(hung_things, "_moulding", lambda _rng, _short: (0.03, depth_m))
+    monkeypatch.setattr(hung_things, "moulding_size", lambda _rng, _short: (0.03, depth_m))
     for seed in range(200):
         rng = np.random.default_rng(seed)
         _piece, shape = hung_things.framed(rng, _style(), 0.5, 0.7, texture, Material("frame"))
