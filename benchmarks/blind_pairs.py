@@ -1,7 +1,7 @@
 """The score of a blind model on minimal pairs: words and colours of pictures, no geometry; part of `make bench NAME=sets`.
 
 Ridge regression chooses one of the two options by their words, and by the colours of a coarse picture for each kind of
-answer ("cannot be told", "left", ...). It is judged on homes that it was not fitted to.
+answer (such as "left"). It is judged on homes that it was not fitted to.
 """
 
 from __future__ import annotations
@@ -112,7 +112,7 @@ def _score(rows: list[dict[str, Any]], *, with_colours: bool) -> tuple[float, fl
 
 
 def _features(row: dict[str, Any], *, with_colours: bool) -> NDArray[np.float64]:
-    """What speaks for the first option and against the second."""
+    """Features (N,) of the first option less those of the second."""
     one, two = (option[3:] for option in row["options"])
     words = _words(f"{row['question_type']} {row['question']}", one) - _words(
         f"{row['question_type']} {row['question']}", two

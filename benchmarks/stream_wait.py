@@ -1,9 +1,9 @@
-"""How long a trainer waits for a stream, and whether its bytes repeat; part of `make bench NAME=sets`.
+"""Waiting time of a trainer of a stream, and equality of its bytes; part of `make bench NAME=sets`.
 
 The study's plan `lite` trains normals on 160x120 views of two generated homes, in batches of 8, on the cores that also
 render. The share of waiting is that of the steady state: seconds in which the training loop waits for its next batch,
-over all seconds of `reuse` epochs, in which each home gets new views once. They follow at once upon an epoch whose
-views are rendered, without a pause: the renderer is only as far ahead as it got beside the training. Steps take as
+over all seconds of `reuse` epochs, in which each home gets new views once. They follow an epoch whose views are
+rendered without a pause: the renderer is only as far ahead as it got beside the training. Steps take as
 long as they do on the shared cores; `stream.step_s` is their time with idle cores.
 """
 

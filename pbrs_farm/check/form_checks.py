@@ -375,7 +375,7 @@ def check_frames(case: FormCase) -> None:
 
 
 def check_cameras(case: FormCase) -> None:
-    """K and poses in files of their own."""
+    """K and poses in separate files."""
     for file, truth in _views_of(case, "form cameras"):
         stored = camera_matrix(stored_bytes(case.folder / file))
         wanted = wanted_matrix(case.form.to, file, truth.facts)

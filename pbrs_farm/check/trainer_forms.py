@@ -16,7 +16,7 @@ from pbrs_farm.core.arrays import F64, Bools
 Z_UP = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])  # from y up
 _GRID_PX = 224  # long side of the grid of points of covisibility
 _NEAREST_M = 0.04  # of a point in the other frame
-_ROWS = 12  # of a matrix of covisibility that are computed again
+_ROWS = 12  # of a matrix of covisibility to compute again
 
 
 def metres_of_logarithms(data: bytes) -> F64:
@@ -78,7 +78,7 @@ class _Frame:
         return world.T[z > 0], len(z)
 
     def sees(self, points: F64) -> Bools:
-        """True for the points that are in the picture and not hidden."""
+        """True for points in the picture that nothing hides."""
         local = (points - self.pose[:3, 3]) @ self.pose[:3, :3]
         z = local[:, 2]
         is_ahead = z > _NEAREST_M

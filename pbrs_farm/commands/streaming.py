@@ -84,7 +84,8 @@ def stream(
     )
     epoch = Stream(plan).epoch(0)
     where = farm or "this machine"
-    text = f"{named.name}: {len(epoch)} views of {len(homes)} homes an epoch, rendered on {where}"
+    word = "home" if len(homes) == 1 else "homes"
+    text = f"{named.name}: {len(epoch)} views of {len(homes)} {word} an epoch, rendered on {where}"
     sys.stderr.write(f"{text}; cache {plan.folder}, at most {cache_gb:g} GB\n")
     return epoch
 

@@ -177,17 +177,19 @@ def _print_run(out: Path) -> None:
 
 
 def _evaluate(args: argparse.Namespace) -> None:
+    at_least("--views", args.views, 0)
+    _check_judged(args)
     _need_torch()
     from pbrs_farm.study.judging.evaluation import evaluate, evaluation_text, open_run, report
     from pbrs_farm.study.judging.judged_places import open_judged_places
     from pbrs_farm.study.judging.others_predictions import others_predictions
+    from pbrs_farm.study.judging.packed_weights import shipped_run
     from pbrs_farm.study.training.photograph_views import digests_of
     from pbrs_farm.study.training.run_folder import make_folder
     from pbrs_farm.study.training.view_sources import NYU_LIGHT, PHOTO_LIGHT
 
-    at_least("--views", args.views, 0)
     columns = [others_predictions(word) for word in args.predictions]
-    folder = _judged_run(args)
+    folder = shipped_run(args.task) if args.task else args.run
     run = open_run(folder, exact=args.exact)
     out = args.out or folder / "evaluation"
     if args.on:
@@ -221,16 +223,13 @@ def _evaluate(args: argparse.Namespace) -> None:
             echo(str(page))
 
 
-def _judged_run(args: argparse.Namespace) -> Path:
-    """The run of `evaluate RUN`, or the package's own weights of --task."""
-    from pbrs_farm.study.judging.packed_weights import shipped_run
-
+def _check_judged(args: argparse.Namespace) -> None:
+    """Raises BadInput unless `evaluate` names one network and, for shipped weights, an output folder."""
     if (args.run is None) == (args.task is None):
         text, hint = "give either a RUN or --task", "pbrs-farm evaluate RUN, or --task normals"
         raise BadInput("evaluate", str(args.run or ""), text, hint=hint)
     if args.task and args.on and not args.out:
         raise BadInput("--task", args.task, "needs --out", hint="--out DIR")
-    return shipped_run(args.task) if args.task else args.run
 
 
 def _with_column(

@@ -16,9 +16,11 @@ import numpy as np
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import ItemKind, LightPart, Material, Note, Surface, Texture
 from pbrs_farm.core.joints import Joint
 from pbrs_farm.core.mesh import points_bounds
+from pbrs_farm.core.shown_text import hint_of_choice
 
 FAMILIES_VERSION: Final = 14
 """Version of the shapes of our families of furniture, part of the catalogue's digest and of repair's.
@@ -110,9 +112,16 @@ class Catalogue:
         """Only generated pieces and library pieces and pictures of these licences; () for all.
 
         "CC-BY" means each version of it, but not CC-BY-SA; a piece without a named licence never matches.
+        Raises BadInput for a licence that none of the libraries' pieces and pictures has.
         """
         if not licences:
             return self
+        of_entries = sorted({e.licence for e in (*self.pieces, *self.pictures) if e.licence})
+        known = {word for name in of_entries for word in (name, name.partition(" ")[0])}
+        for name in licences:
+            if known and name not in known:
+                hint = hint_of_choice(name, of_entries)
+                raise BadInput("dress.licences", name, "no library has it", hint=hint)
 
         def is_allowed(entry: Piece | Picture) -> bool:
             first_word = entry.licence.partition(" ")[0]

@@ -458,7 +458,7 @@ def test_openspatial_reads_rows_of_views_and_of_homes(
     stills: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     export(stills, tmp_path / "set", "openspatial")
-    # Its engine opens paths as they are.
+    # Its engine opens relative paths.
     monkeypatch.chdir(tmp_path / "set")
     rows = pd.read_parquet("singleview.parquet").to_dict("records")
     (scene,) = pd.read_parquet("multiview.parquet").to_dict("records")
@@ -580,9 +580,9 @@ def test_layered_depth_counts_fronts_behind_clear_surfaces(stills: Path, tmp_pat
     folder = Path(shutil.copytree(stills, tmp_path / "glass"))
     first, second = views_of(folder)
     shape = stored(first, "depth").shape
-    # A pane, a glass block (front, back), a hollow glass (four surfaces), a wall, and what is behind it.
+    # A pane, a glass block (front, back), a hollow glass (four surfaces), a wall, and a surface behind it.
     ray = [(1000, 5, 1), (1500, 6, 1), (1600, 6, 1), (2000, 7, 1), (2010, 7, 1), (2090, 7, 1), (2100, 7, 1), (3000, 8, 0)]  # fmt: skip
-    # A wall at once; a block at the wall; a pane before the open sky; nothing.
+    # A wall alone; a block at the wall; a pane before the open sky; nothing.
     others = [
         [(900, 8, 0), (950, 8, 0)],
         [(700, 6, 1), (800, 6, 1), (801, 8, 0)],

@@ -15,7 +15,7 @@ from pbrs_farm.check.fact_checks import check_licences
 from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import Catalogue, Picture, Piece, Place
-from pbrs_farm.core.errors import BadRecipe
+from pbrs_farm.core.errors import BadInput, BadRecipe
 from pbrs_farm.core.house import Texture
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.dress.report import Credit, DressReport
@@ -105,6 +105,10 @@ def test_a_catalogue_of_chosen_licences() -> None:
     assert [piece.id for piece in both.pieces] == ["p0", "p1", "p2", "p5"]
     assert [p.id for p in whole.with_licences(["CC-BY 4.0"]).pieces] == ["p2", "p5"]
     assert whole.with_licences([]) is whole
+    with pytest.raises(
+        BadInput, match=r"dress\.licences: CCO: no library has it \(did you mean CC0\?"
+    ):
+        whole.with_licences(["CC-BY", "CCO"])
     assert len({whole.digest, free.digest, both.digest}) == 3
 
 

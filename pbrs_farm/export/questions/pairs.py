@@ -33,9 +33,7 @@ from pbrs_farm.export.sequences import pose_opencv
 _MOST_PAIRS: Final = 400  # subjects of a home, for each kind
 _OF_A_PICTURE: Final = 2  # questions of a kind about a picture, in all of its pairs
 _LEAST_OPEN: Final = 0.3  # share of a door's way from which it is clearly open
-_LEAST_COMMON: Final = (
-    2  # items in both pictures of a subject, so that their cameras can be related
-)
+_LEAST_COMMON: Final = 2  # items in both pictures of a subject, which relate their cameras
 _LEAST_TURN_DEG: Final = 20.0
 _MOST_TURN_DEG: Final = 150.0
 _APART: Final = 0.05  # of two lamps, as a share of a picture's width
