@@ -373,14 +373,15 @@ def family(
 def described_in(modules: Iterable[ModuleType], kind: type[D]) -> dict[str, D]:
     """The items or families of some modules by name, in the order of their definitions.
 
-    kind: Thing or Family. BadInput if two have the same name.
+    kind: Thing or Family; dictionaries of them count too. BadInput if two have the same name.
     """
     result: dict[str, D] = {}
     for module in modules:
-        for value in vars(module).values():
+        values = vars(module).values()
+        for value in (v for x in values for v in (x.values() if type(x) is dict else (x,))):
             if not isinstance(value, kind) or value.build.__module__ != module.__name__:
                 continue
-            if value.name in result:
+            if result.get(value.name, value) is not value:
                 raise BadInput(module.__name__, value.name, "is already the name of another object")
             result[value.name] = value
     return result

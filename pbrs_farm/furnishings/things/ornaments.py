@@ -3,86 +3,45 @@
 from __future__ import annotations
 
 from itertools import product
+from typing import NamedTuple
 
 import numpy as np
 from numpy import cos, pi, sin
 
 from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_y, rotation_z
-from pbrs_farm.core.house import Material, Surface
+from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import shade
 from pbrs_farm.dress.thing_materials import glass, plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.geometry.bodies import revolve
 from pbrs_farm.geometry.outlines import bent, oval, rect, ring_path, rings, scaled
 
 
 # fmt: off
+class Look(NamedTuple):
+    """Materials of an ornament."""
+
+    material: Material
+    body: Material  # the same or the wood
+    grain: Material
+
+
 @thing(group="ornament")
 def ornament(m: Maker) -> None:
     """An ornament.
 
     An animal, a house, a globe, a boat, a camera, a stack of pebbles and many more.
     """
-    form = m.integers(0, 24)
+    form = m.integers(0, len(_FORMS))
     material = m.metal if m.chance(0.25) else plain("ornament", m.any_colour(), m.uniform(0.2, 0.8))
     grain = plain("ornament wood", m.wood, 0.5)
     body = grain if m.chance(0.4) else material
-    s = m.uniform(0.85, 1.2)
-    match form:
-        case 0:
-            m.add(sculpture(m), of=material)
-        case 1:
-            bird(m, s, body)
-        case 2:
-            cat(m, s, body)
-        case 3:
-            elephant(m, s, body)
-        case 4:
-            little_house(m, material, body, grain)
-        case 5:
-            globe(m, grain)
-        case 6:
-            hourglass(m, grain)
-        case 7:
-            pyramid(m, body)
-        case 8:
-            ring_sculpture(m, material, grain)
-        case 9:
-            arch(m)
-        case 10:
-            wooden_tree(m, body, grain)
-        case 11:
-            pebbles(m)
-        case 12:
-            boat(m, s, body, grain)
-        case 13:
-            camera(m)
-        case 14:
-            trophy(m, s)
-        case 15:
-            bust(m, material, grain)
-        case 16:
-            treasure_chest(m, body)
-        case 17:
-            cube_puzzle(m)
-        case 18:
-            snow_globe(m, body)
-        case 19:
-            bead_string(m, body)
-        case 20:
-            metronome(m, grain)
-        case 21:
-            toy_car_model(m, material)
-        case 22:
-            horse(m, s, body)
-        case 23:
-            blocks(m, material, grain)
+    m.name = _FORMS[form].__name__
+    _FORMS[form](m, m.uniform(0.85, 1.2), Look(material, body, grain))
 
 
-def bird(m: Maker, s: float, own: Material) -> None:
+def bird(m: Maker, s: float, look: Look) -> None:
     """A bird."""
-    m.name = "bird"
-    with m.of(own):
+    with m.of(look.body):
         m.ellipsoid((0.035 * s, 0.032 * s, 0.055 * s), n=14, turn=rotation_x(-0.35),
             at=(0, 0.062 * s, 0))
         m.sphere((0, 0.1 * s, 0.038 * s), 0.022 * s, n=12)
@@ -94,10 +53,9 @@ def bird(m: Maker, s: float, own: Material) -> None:
         of=m.metal)
 
 
-def cat(m: Maker, s: float, own: Material) -> None:
+def cat(m: Maker, s: float, look: Look) -> None:
     """A cat."""
-    m.name = "cat"
-    with m.of(own):
+    with m.of(look.body):
         m.revolve(scaled(s, s, [(0, 0), (0.042, 0), (0.046, 0.02), (0.034, 0.07), (0.02, 0.1),
             (0, 0.105)]))
         m.sphere((0, 0.12 * s, 0.008), 0.028 * s, n=12)
@@ -107,10 +65,9 @@ def cat(m: Maker, s: float, own: Material) -> None:
             (0.05 * s, 0.008, 0.04 * s)], 0.03, n=3), 0.008, n=6)
 
 
-def elephant(m: Maker, s: float, own: Material) -> None:
+def elephant(m: Maker, s: float, look: Look) -> None:
     """An elephant."""
-    m.name = "elephant"
-    with m.of(own):
+    with m.of(look.body):
         m.rounded(0.07 * s, (0.045 * s, 0.115 * s), (-0.05 * s, 0.045 * s), 0.03 * s)
         for x, z in product((-0.02, 0.02), (-0.035, 0.03)):
             m.frustum((0.013 * s, 0), (0.012 * s, 0.06 * s), n=10, at=(x * s, 0, z * s))
@@ -122,24 +79,22 @@ def elephant(m: Maker, s: float, own: Material) -> None:
                 at=(x * 0.03 * s, 0.11 * s, 0.045 * s))
 
 
-def little_house(m: Maker, material: Material, own: Material, grain: Material) -> None:
+def little_house(m: Maker, s: float, look: Look) -> None:
     """A little house."""
-    m.name = "little_house"
     w, h, d = m.uniform(0.045, 0.065), m.uniform(0.07, 0.12), m.uniform(0.04, 0.06)
-    m.box(w, h, d, 0.002, of=material)
+    m.box(w, h, d, 0.002, of=look.material)
     m.loft(rings(rect, [(w + 0.012, d + 0.01, 0.0005, h), (0.004, d + 0.01, 0.0005,
-        h + w * m.uniform(0.6, 1.0))], n=1), sharp=20.0, of=own)
+        h + w * m.uniform(0.6, 1.0))], n=1), sharp=20.0, of=look.body)
     for x, y in product((-0.22, 0.22), (0.62, 0.8)):
         m.box(((x - 0.12) * w, (x + 0.12) * w), ((y - 0.06) * h, (y + 0.06) * h), 0.0008,
             against=d / 2, of=plain("window", (0.9, 0.82, 0.6), 0.5))
-    m.box(0.28 * w, (0.001, 0.3 * h), 0.0008, against=d / 2, of=grain)
+    m.box(0.28 * w, (0.001, 0.3 * h), 0.0008, against=d / 2, of=look.grain)
 
 
-def globe(m: Maker, grain: Material) -> None:
+def globe(m: Maker, s: float, look: Look) -> None:
     """A globe."""
-    m.name = "globe"
     r = m.uniform(0.06, 0.1)
-    m.turned([(r * 0.7, 0), (r * 0.66, 0.012), (r * 0.14, 0.025), (r * 0.1, 0.06)], n=18, of=grain)
+    m.turned([(r * 0.7, 0), (r * 0.66, 0.012), (r * 0.14, 0.025), (r * 0.1, 0.06)], n=18, of=look.grain)
     m.sphere((0, r + 0.07, 0), r, n=20, of=plain("globe", m.pick((0.35, 0.5, 0.62),
         (0.75, 0.68, 0.5), (0.2, 0.3, 0.4)), 0.35))
     with m.moved(turn=rotation_z(0.4), at=(0, r + 0.07, 0)):
@@ -148,48 +103,44 @@ def globe(m: Maker, grain: Material) -> None:
         m.rod(0, (-r - 0.012, r + 0.012), 0, 0.0025, n=6, of=m.metal)
 
 
-def hourglass(m: Maker, grain: Material) -> None:
+def hourglass(m: Maker, s: float, look: Look) -> None:
     """A hourglass."""
-    m.name = "hourglass"
     h, r = m.uniform(0.13, 0.2), m.uniform(0.03, 0.04)
     for y in (0.0, h - 0.012):
-        m.cylinder(r + 0.012, 0, 0.012, n=18, at=(0, y, 0), of=grain)
+        m.cylinder(r + 0.012, 0, 0.012, n=18, at=(0, y, 0), of=look.grain)
     m.turned([(r * 0.9, 0.0125), (r, 0.035), (r * 0.8, 0.36 * h), (0.004, 0.5 * h),
         (r * 0.8, 0.64 * h), (r, h - 0.035), (r * 0.9, h - 0.0125)], n=18, of=glass())
     m.revolve([(0, 0.013), (r * 0.86, 0.013), (r * 0.8, 0.03), (0, 0.3 * h)],
         of=plain("sand", (0.8, 0.66, 0.45), 0.9))
     for k in range(3):
         m.rod(cos(2.1 * k) * (r + 0.006), (0.006, h - 0.006), sin(2.1 * k) * (r + 0.006), 0.0035,
-            n=6, of=grain)
+            n=6, of=look.grain)
 
 
-def pyramid(m: Maker, own: Material) -> None:
+def pyramid(m: Maker, s: float, look: Look) -> None:
     """A pyramid."""
-    m.name = "pyramid"
     a = m.uniform(0.05, 0.09)
     if m.chance(0.5):
         m.loft(rings(rect, [(a, a, 0.001, 0), (a * 0.7, a * 0.7, 0.001, a * 2.2),
-            (0.004, 0.004, 0.001, a * 2.8)], n=1), sharp=10.0, of=own)
+            (0.004, 0.004, 0.001, a * 2.8)], n=1), sharp=10.0, of=look.body)
     else:
         m.loft(rings(oval, [(a * 1.4, a * 1.4, 0), (0.004, 0.004, a * 1.1)], n=4), sharp=10.0,
-            of=own)
+            of=look.body)
 
 
-def ring_sculpture(m: Maker, material: Material, grain: Material) -> None:
+def ring_sculpture(m: Maker, s: float, look: Look) -> None:
     """A ring sculpture."""
-    m.name = "ring_sculpture"
     r = m.uniform(0.06, 0.1)
-    m.box(0.1, 0.02, 0.06, 0.002, of=grain)
+    m.box(0.1, 0.02, 0.06, 0.002, of=look.grain)
     m.tube(ring_path(r, n=24), m.uniform(0.008, 0.018), turn=rotation_x(pi / 2),
-        at=(0, r + 0.028, 0), of=material)
+        at=(0, r + 0.028, 0), of=look.material)
     if m.chance(0.5):
         m.tube(ring_path(r * 0.6, n=20), 0.008, turn=rotation_x(pi / 2),
-            at=(0.01, r * 0.75 + 0.028, 0.012), of=material)
+            at=(0.01, r * 0.75 + 0.028, 0.012), of=look.material)
 
 
-def arch(m: Maker) -> None:
+def arch(m: Maker, _s: float, look: Look) -> None:
     """An arch."""
-    m.name = "arch"
     w = m.uniform(0.1, 0.15)
     for k in range(m.integers(1, 4)):
         m.tube(bent([(-w / 2 + k * 0.022, 0, 0), (-w / 2 + k * 0.022, w - k * 0.022, 0),
@@ -197,20 +148,18 @@ def arch(m: Maker) -> None:
             n=7), 0.009, of=plain("arch", m.any_colour(), 0.6))
 
 
-def wooden_tree(m: Maker, own: Material, grain: Material) -> None:
+def wooden_tree(m: Maker, s: float, look: Look) -> None:
     """A wooden tree."""
-    m.name = "wooden_tree"
     h = m.uniform(0.14, 0.26)
-    m.rod(0, (0, 0.3 * h), 0, 0.008, of=grain)
-    m.frustum((0.03, 0), (0.028, 0.008), n=14, of=grain)
+    m.rod(0, (0, 0.3 * h), 0, 0.008, of=look.grain)
+    m.frustum((0.03, 0), (0.028, 0.008), n=14, of=look.grain)
     for k in range(3):
         m.turned([(0.05 - 0.012 * k, 0.0), (0.03 - 0.008 * k, 0.12 * h), (0.006, 0.28 * h)],
-            at=(0, (0.2 + 0.24 * k) * h, 0), of=own)
+            at=(0, (0.2 + 0.24 * k) * h, 0), of=look.body)
 
 
-def pebbles(m: Maker) -> None:
+def pebbles(m: Maker, _s: float, look: Look) -> None:
     """A stack of pebbles."""
-    m.name = "pebbles"
     y = 0.0
     for k in range(m.integers(3, 6)):
         a, b = 0.05 - 0.008 * k, m.uniform(0.012, 0.019)
@@ -221,13 +170,12 @@ def pebbles(m: Maker) -> None:
         y += 1.9 * b
 
 
-def boat(m: Maker, s: float, own: Material, grain: Material) -> None:
+def boat(m: Maker, s: float, look: Look) -> None:
     """A boat."""
-    m.name = "boat"
-    m.box(0.1, 0.012, 0.04, 0.002, of=grain)
+    m.box(0.1, 0.012, 0.04, 0.002, of=look.grain)
     m.loft(rings(oval, [(0.12 * s, 0.018 * s, 0.013), (0.17 * s, 0.042 * s, 0.035 * s),
-        (0.18 * s, 0.044 * s, 0.045 * s)], n=16), of=own)
-    m.rod(0, (0.04 * s, 0.25 * s), 0, 0.003, n=6, of=grain)
+        (0.18 * s, 0.044 * s, 0.045 * s)], n=16), of=look.body)
+    m.rod(0, (0.04 * s, 0.25 * s), 0, 0.003, n=6, of=look.grain)
     sail = plain("sail", (0.9, 0.88, 0.82), 0.9)
     for x0, x1, top in ((0.006, 0.075, 0.24), (-0.07, -0.006, 0.2)):
         m.loft([([(x0 * s, -0.001), (x0 * s, 0.001), (x1 * s, 0.001), (x1 * s, -0.001)], 0.06 * s),
@@ -236,9 +184,8 @@ def boat(m: Maker, s: float, own: Material, grain: Material) -> None:
             (0.001 + (x0 if x0 > 0 else x1) * s, -0.001)], top * s)], sharp=10.0, of=sail)
 
 
-def camera(m: Maker) -> None:
+def camera(m: Maker, _s: float, look: Look) -> None:
     """A camera."""
-    m.name = "camera"
     black = plain("camera black", (0.07, 0.07, 0.07), 0.6)
     m.box(0.13, 0.05, 0.032, 0.004, of=black)
     m.box(0.13, (0.05, 0.072), 0.03, 0.004, of=m.metal)
@@ -248,9 +195,8 @@ def camera(m: Maker) -> None:
     m.cylinder(0.009, 0, 0.007, n=12, at=(-0.045, 0.0715, 0), of=m.metal, mirrored="x")
 
 
-def trophy(m: Maker, s: float) -> None:
+def trophy(m: Maker, s: float, look: Look) -> None:
     """A trophy."""
-    m.name = "trophy"
     m.box(0.07, 0.035, 0.07, 0.003, of=plain("stone", (0.1, 0.1, 0.1), 0.3))
     m.vessel([(0, 0.036), (0.026, 0.036), (0.01, 0.05), (0.008, 0.08 * s), (0.03, 0.1 * s),
         (0.045, 0.14 * s), (0.05, 0.18 * s)], 0.002, n=18, of=m.metal)
@@ -259,11 +205,10 @@ def trophy(m: Maker, s: float) -> None:
             (x * 0.034, 0.105 * s, 0)], 0.02, n=3), 0.0035, n=6, of=m.metal)
 
 
-def bust(m: Maker, material: Material, grain: Material) -> None:
+def bust(m: Maker, s: float, look: Look) -> None:
     """A bust of a person."""
-    m.name = "bust"
-    m.box(0.08, 0.025, 0.07, 0.003, of=grain)
-    with m.of(material):
+    m.box(0.08, 0.025, 0.07, 0.003, of=look.grain)
+    with m.of(look.material):
         m.loft([(oval(0.05, 0.045), 0.0255), (oval(0.12, 0.07), 0.06), (oval(0.1, 0.06), 0.085),
             (oval(0.045, 0.045), 0.105), (oval(0.042, 0.045, z=0.004), 0.13)])
         m.ellipsoid((0.034, 0.046, 0.04), n=16, at=(0, 0.165, 0.006))
@@ -271,20 +216,18 @@ def bust(m: Maker, material: Material, grain: Material) -> None:
         m.ellipsoid((0.036, 0.034, 0.038), n=12, at=(0, 0.182, -0.004))
 
 
-def treasure_chest(m: Maker, own: Material) -> None:
+def treasure_chest(m: Maker, s: float, look: Look) -> None:
     """A treasure chest."""
-    m.name = "treasure_chest"
     w, h, d = m.uniform(0.12, 0.18), m.uniform(0.05, 0.08), m.uniform(0.08, 0.11)
-    m.box(w, h, d, 0.002, of=own)
-    m.rod((-w / 2, w / 2), h, 0, d / 2, n=20, of=own, name="lid")
+    m.box(w, h, d, 0.002, of=look.body)
+    m.rod((-w / 2, w / 2), h, 0, d / 2, n=20, of=look.body, name="lid")
     for x in (-0.3, 0.3):
         m.box(((x - 0.04) * w, (x + 0.04) * w), (-0.0005, h), d + 0.003, 0.001, of=m.metal)
     m.box(0.024, 0.028, 0.004, 0.001, on=h - 0.02, against=d / 2, of=m.metal)
 
 
-def cube_puzzle(m: Maker) -> None:
+def cube_puzzle(m: Maker, _s: float, look: Look) -> None:
     """A cube puzzle."""
-    m.name = "cube_puzzle"
     for x, y, z in product((-1, 0, 1), (-1, 0, 1), (-1, 0, 1)):
         m.box(0.0182, 0.0186, 0.0182, 0.0015, x=0.019 * x, on=0.0285 + y * 0.019 - 0.0095,
             z=0.019 * z, of=m.pick(plain("red", (0.72, 0.1, 0.1), 0.4),
@@ -292,10 +235,9 @@ def cube_puzzle(m: Maker) -> None:
             plain("green", (0.1, 0.5, 0.25), 0.4), plain("pale", (0.9, 0.9, 0.9), 0.4)))
 
 
-def snow_globe(m: Maker, own: Material) -> None:
+def snow_globe(m: Maker, s: float, look: Look) -> None:
     """A snow globe."""
-    m.name = "snow_globe"
-    m.turned([(0.04, 0), (0.036, 0.02), (0.03, 0.025)], n=20, of=own)
+    m.turned([(0.04, 0), (0.036, 0.02), (0.03, 0.025)], n=20, of=look.body)
     m.revolve([(0, 0.0252), (0.024, 0.0252), (0.04, 0.045), (0.042, 0.062), (0.034, 0.088),
         (0.018, 0.1), (0, 0.103)], n=20, of=glass())
     m.revolve([(0, 0.0254), (0.022, 0.0254), (0.03, 0.038), (0, 0.043)], n=14,
@@ -303,40 +245,36 @@ def snow_globe(m: Maker, own: Material) -> None:
     m.revolve([(0, 0.04), (0.014, 0.042), (0, 0.08)], n=10, of=plain("fir", (0.1, 0.3, 0.18), 0.8))
 
 
-def bead_string(m: Maker, own: Material) -> None:
+def bead_string(m: Maker, s: float, look: Look) -> None:
     """A bead string."""
-    m.name = "bead_string"
     n, r = m.integers(14, 20), m.uniform(0.009, 0.012)
     for k in range(n):
         m.sphere((cos(2 * pi * k / n) * n * r * 0.33, r, sin(2 * pi * k / n) * n * r * 0.33), r,
-            n=8, of=own)
+            n=8, of=look.body)
 
 
-def metronome(m: Maker, grain: Material) -> None:
+def metronome(m: Maker, s: float, look: Look) -> None:
     """A metronome."""
-    m.name = "metronome"
     m.loft(rings(rect, [(0.11, 0.1, 0.004, 0), (0.11, 0.1, 0.004, 0.012),
         (0.1, 0.09, 0.003, 0.0125), (0.05, 0.045, 0.003, 0.2), (0.03, 0.025, 0.003, 0.22)], n=1),
-        sharp=25.0, of=grain)
+        sharp=25.0, of=look.grain)
     m.tube([(0, 0.05, 0.046), (m.uniform(-0.02, 0.02), 0.19, 0.034)], 0.0018, n=5, of=m.metal)
     m.box(0.018, (0.12, 0.14), (0.036, 0.044), 0.001, of=m.metal)
 
 
-def toy_car_model(m: Maker, material: Material) -> None:
+def toy_car_model(m: Maker, s: float, look: Look) -> None:
     """A toy car model."""
-    m.name = "toy_car_model"
-    m.box(0.06, (0.012, 0.036), 0.14, 0.008, of=material)
+    m.box(0.06, (0.012, 0.036), 0.14, 0.008, of=look.material)
     m.loft([(rect(0.056, 0.085, 0.008, z=-0.005), 0.0361),
-        (rect(0.046, 0.055, 0.008, z=-0.008), 0.06)], of=material)
+        (rect(0.046, 0.055, 0.008, z=-0.008), 0.06)], of=look.material)
     for x, z in product((-0.029, 0.029), (-0.045, 0.045)):
         m.rod((x - 0.006, x + 0.006), 0.014, z, 0.014, n=14,
             of=plain("tyre", (0.06, 0.06, 0.06), 0.8))
 
 
-def horse(m: Maker, s: float, own: Material) -> None:
+def horse(m: Maker, s: float, look: Look) -> None:
     """A horse."""
-    m.name = "horse"
-    with m.of(own):
+    with m.of(look.body):
         m.rounded(0.044 * s, (0.08 * s, 0.125 * s), (-0.06 * s, 0.05 * s), 0.02 * s)
         for x, z in product((-0.013, 0.013), (-0.048, 0.04)):
             m.rod(x * s, (0, 0.09 * s), z * s, 0.006 * s, end=0.011 * s)
@@ -349,19 +287,19 @@ def horse(m: Maker, s: float, own: Material) -> None:
             mirrored="x")
 
 
-def blocks(m: Maker, material: Material, grain: Material) -> None:
+def blocks(m: Maker, s: float, look: Look) -> None:
     """A stack of blocks."""
-    m.name = "blocks"
     y = 0.0
     for _ in range(m.integers(2, 5)):
         w, h, d = m.uniform(0.04, 0.09), m.uniform(0.02, 0.06), m.uniform(0.03, 0.06)
         m.box(w, h, d, 0.003, on=y, turn=rotation_y(m.uniform(-0.3, 0.3)),
-            of=m.pick(grain, material, plain("ornament", m.any_colour(), 0.5)))
+            of=m.pick(look.grain, look.material, plain("ornament", m.any_colour(), 0.5)))
         y += h + 0.0002
 
 
-def sculpture(m: Maker) -> Surface:
+def sculpture(m: Maker, _s: float, look: Look) -> None:
     """Bodies turned about one axis, each smaller than the one below it."""
+    m.name = ""  # it is no figure
     n, y, profile = m.integers(2, 5), 0.0, [(0.0, 0.0)]
     r = m.uniform(0.035, 0.055)
     for _ in range(n):
@@ -372,4 +310,9 @@ def sculpture(m: Maker) -> Surface:
         y, r = y + tall, r * m.uniform(0.6, 0.9)
     profile.append((0.0, y))
     profile[1] = (profile[1][0] + 0.01, 0.0)
-    return revolve(profile, n=14)
+    m.revolve(profile, n=14, of=look.material)
+
+
+_FORMS = (sculpture, bird, cat, elephant, little_house, globe, hourglass, pyramid, ring_sculpture, arch,
+    wooden_tree, pebbles, boat, camera, trophy, bust, treasure_chest, cube_puzzle, snow_globe,
+    bead_string, metronome, toy_car_model, horse, blocks)

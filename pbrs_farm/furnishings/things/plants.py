@@ -1,23 +1,25 @@
-"""Potted plants of the generated catalogue, for floors and surfaces; no effects."""
+"""Potted plants of the generated catalogue, for floors and surfaces; described in plants.csv. Effect: reads it."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from typing import Final
+from collections.abc import Callable, Mapping, Sequence
+from pathlib import Path
+from typing import Final, Literal
 
 import numpy as np
 from numpy import cos, pi, sin
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Place
+from pbrs_farm.core.classes import OTHERPROP
 from pbrs_farm.core.frames import rotation_y, rotation_z
 from pbrs_farm.core.house import Material
+from pbrs_farm.core.record import Record, Several, read_csv
 from pbrs_farm.dress.models import transformed
 from pbrs_farm.dress.style import mix, shade
 from pbrs_farm.dress.thing_materials import EARTH, WICKER, plain
 from pbrs_farm.furnishings.things.cloth import sheet
-from pbrs_farm.furnishings.things.maker import Maker, Size, family
-from pbrs_farm.furnishings.things.shapes import Pair
+from pbrs_farm.furnishings.things.maker import Family, Maker, Size
 from pbrs_farm.geometry.bodies import stretched
 from pbrs_farm.geometry.outlines import Triple, bent, fluted, polar, rect, rings, scaled
 
@@ -291,104 +293,35 @@ def _planted(m: Maker, size: Size, pot_share: float, grow: Grow, *, spread: floa
         m.add(stretched(centred, scale), at=(0.0, foot, 0.0), of=material)
 
 
-def _round(width: Pair, height: Pair) -> Callable[[Maker], Size]:
-    """Size function of plants with equal width and depth."""
-    return lambda m: (*(m.uniform(*width),) * 2, m.uniform(*height))
+_GROW: Final[Mapping[str, Grow]] = {f.__name__: f for f in (swords, fountain, broad, palm, tree, yucca,
+    cactus, rosette, flowers)}
 
 
-@family(group="plant", place=Place.FLOOR, called="plant", variants=8,
-    size=_round((0.26, 0.36), (0.75, 1.15)))
-def snake_plant(m: Maker, size: Size) -> None:
-    """Upright blades in a pot on the floor."""
-    _planted(m, size, 0.85, swords)
+class _Plant(Record):
+    """A row of plants.csv."""
+
+    name: str
+    called: str
+    place: Literal["FLOOR", "SURFACE"]
+    variants: int
+    grow: str  # a key of _GROW
+    pot_share: float
+    spread: float = 1.0
+    width_m: Several[float]  # least and greatest; the depth is equal
+    height_m: Several[float]
+
+    def size(self, m: Maker) -> Size:
+        """Draw a size."""
+        width = m.uniform(*self.width_m)
+        return width, width, m.uniform(*self.height_m)
+
+    def build(self, m: Maker, size: Size) -> None:
+        """Make one."""
+        _planted(m, size, self.pot_share, _GROW[self.grow], spread=self.spread)
 
 
-@family(group="plant", place=Place.FLOOR, called="plant", variants=8,
-    size=_round((0.7, 0.9), (0.8, 1.1)))
-def spider_plant(m: Maker, size: Size) -> None:
-    """Long leaves that bend over on every side."""
-    _planted(m, size, 0.4, fountain)
-
-
-@family(group="plant", place=Place.FLOOR, called="plant", variants=10,
-    size=_round((0.55, 0.8), (0.8, 1.2)))
-def peace_lily(m: Maker, size: Size) -> None:
-    """Broad leaves on stalks."""
-    _planted(m, size, 0.45, broad)
-
-
-@family(group="plant", place=Place.FLOOR, called="plant", variants=10,
-    size=_round((0.7, 0.9), (1.3, 1.9)))
-def areca_palm(m: Maker, size: Size) -> None:
-    """Feathered stalks."""
-    _planted(m, size, 0.36, palm)
-
-
-@family(group="plant", place=Place.FLOOR, called="plant", variants=12,
-    size=_round((0.55, 0.85), (1.2, 1.9)))
-def ficus_tree(m: Maker, size: Size) -> None:
-    """A small tree with a crown of single leaves."""
-    _planted(m, size, 0.45, tree)
-
-
-@family(group="plant", place=Place.FLOOR, called="plant", variants=10,
-    size=_round((0.5, 0.75), (1.0, 1.7)))
-def yucca_plant(m: Maker, size: Size) -> None:
-    """Bare stems with tufts of narrow leaves."""
-    _planted(m, size, 0.45, yucca)
-
-
-@family(group="plant", place=Place.FLOOR, called="plant", variants=6,
-    size=_round((0.28, 0.4), (0.6, 1.3)))
-def tall_cactus(m: Maker, size: Size) -> None:
-    """Ribbed columns."""
-    _planted(m, size, 1.0, cactus, spread=0.66)
-
-
-@family(group="plant", place=Place.SURFACE, called="little_plant", variants=5,
-    size=_round((0.12, 0.18), (0.3, 0.48)))
-def little_snake_plant(m: Maker, size: Size) -> None:
-    """Upright blades in a small pot."""
-    _planted(m, size, 0.85, swords)
-
-
-@family(group="plant", place=Place.SURFACE, called="little_plant", variants=6,
-    size=_round((0.28, 0.36), (0.22, 0.32)))
-def little_spider_plant(m: Maker, size: Size) -> None:
-    """A tuft of long leaves."""
-    _planted(m, size, 0.42, fountain)
-
-
-@family(group="plant", place=Place.SURFACE, called="little_plant", variants=6,
-    size=_round((0.22, 0.32), (0.3, 0.45)))
-def little_lily(m: Maker, size: Size) -> None:
-    """Broad leaves on stalks."""
-    _planted(m, size, 0.48, broad)
-
-
-@family(group="plant", place=Place.SURFACE, called="little_plant", variants=6,
-    size=_round((0.1, 0.16), (0.16, 0.34)))
-def little_cactus(m: Maker, size: Size) -> None:
-    """A cactus of one column or a few."""
-    _planted(m, size, 1.0, cactus, spread=0.66)
-
-
-@family(group="plant", place=Place.SURFACE, called="little_plant", variants=8,
-    size=_round((0.18, 0.28), (0.18, 0.28)))
-def aloe(m: Maker, size: Size) -> None:
-    """Thick leaves in a rosette."""
-    _planted(m, size, 0.6, rosette)
-
-
-@family(group="plant", place=Place.SURFACE, called="little_plant", variants=10,
-    size=_round((0.16, 0.24), (0.3, 0.5)))
-def potted_flowers(m: Maker, size: Size) -> None:
-    """Stems with a blossom each over leaves."""
-    _planted(m, size, 0.62, flowers)
-
-
-@family(group="plant", place=Place.SURFACE, called="little_plant", variants=6,
-    size=_round((0.24, 0.34), (0.3, 0.45)))
-def bonsai(m: Maker, size: Size) -> None:
-    """A very small tree."""
-    _planted(m, size, 0.55, tree)
+PLANTS: Final = {
+    p.name: Family(p.name, p.called, "plant", OTHERPROP, Place[p.place], p.variants, p.size, p.build)
+    for p in read_csv(Path(__file__).with_name("plants.csv"), _Plant)
+}
+"""Families by name, in the order from which seeds draw."""
