@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -27,8 +27,9 @@ class HouseBuilder:
     numbers. State: the parts added so far.
 
         builder = HouseBuilder(path.name, fields, notes, library)
-        id_of_room = builder.set_rooms(rooms)
-        builder.items += (replace(i, level_id=builder.level_of(foot(i))) for i in items)
+        builder.set_rooms(rooms)
+        for item in items:
+            builder.add(item, foot(item))
         for hole in holes:
             builder.add_hole(hole)
         return builder.house(path.stem, Source("front3d", path.name, sha256))
@@ -44,12 +45,13 @@ class HouseBuilder:
     rooms: tuple[Room, ...] = ()
     items: list[Item] = field(default_factory=list)
     openings: list[Opening] = field(default_factory=list)
+    _id_of_room: dict[str, str] = field(default_factory=dict)  # the file's ids -> new ones
 
-    def set_rooms(self, rooms: Sequence[Room]) -> dict[str, str]:
-        """Sort rooms into numbered levels; own ids -> new ones. BadHouse for too many or too much overlap."""
+    def set_rooms(self, rooms: Sequence[Room]) -> None:
+        """Sort rooms into numbered levels. BadHouse for too many or too much overlap."""
         self.levels, self.rooms = levels_of(rooms)
         check_rooms(self.rooms, self.file)
-        return {old.id: new.id for old, new in zip(rooms, self.rooms, strict=True)}
+        self._id_of_room = {old.id: new.id for old, new in zip(rooms, self.rooms, strict=True)}
 
     def level_of(self, y: float) -> str:
         """The id of the level that holds a height of the world, metres."""
@@ -58,6 +60,24 @@ class HouseBuilder:
     def room_at(self, point: F64) -> str | None:
         """The id of the room that holds a point (3,) of the world, metres; None where none does."""
         return room_at(self.rooms, point)
+
+    def add(self, item: Item, foot_y: float, place: F64 | None = None) -> None:
+        """Add an item to the level of foot_y; its room is that of its own room_id in the file.
+
+        Items without a room_id are in the room around the place (3,), if one is given. The rooms of
+        tags `boundary_of:` are renamed, too.
+        """
+        if item.room_id:
+            room_id = self._id_of_room.get(item.room_id)
+        else:
+            room_id = None if place is None else self.room_at(place)
+        tags = []
+        for tag in item.tags:
+            word, _, name = tag.partition(":")
+            is_room = word == "boundary_of"
+            tags.append(f"{word}:{self._id_of_room.get(name, name)}" if is_room else tag)
+        level_id = self.level_of(foot_y)
+        self.items.append(replace(item, level_id=level_id, room_id=room_id, tags=tuple(tags)))
 
     def add_hole(
         self, hole: Hole, *, foot_y: float | None = None, cut_y: float | None = None

@@ -14,7 +14,6 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.arrays import F64, I64, Bools
-from pbrs_farm.core.classes import CEILING, FLOOR, WALL
 from pbrs_farm.core.house import Item, ItemKind, Surface, corners_of_surfaces, part_of
 from pbrs_farm.core.mesh import (
     area_vectors,
@@ -24,6 +23,7 @@ from pbrs_farm.core.mesh import (
     unit_vectors,
 )
 from pbrs_farm.geometry.connected import connected_faces
+from pbrs_farm.read.common.structure_items import CLASS_OF_STRUCTURE
 
 MAX_PLANES: Final = 200  # A wall of more planes is sculpted, not built of sheets, and stays whole
 
@@ -36,9 +36,6 @@ _LEAST_BOXY: Final = 0.7  # minimum share of horizontal and vertical faces in a 
 _THICKER_THAN_WALLS_M: Final = 0.3
 _THICKER_THAN_BLOCKS_M: Final = 0.5
 _LEVEL: Final = 0.7  # least |y| of the normal of a floor, a ceiling or a roof
-
-# NYU40 class of each kind.
-CLASS_OF_STRUCTURE: Final = {ItemKind.WALL: WALL, ItemKind.FLOOR: FLOOR, ItemKind.CEILING: CEILING}
 
 
 def planar_parts(item: Item) -> tuple[Item, ...]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -12,7 +12,7 @@ import shapely
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.classes import CEILING, FLOOR, OTHERPROP, WALL
+from pbrs_farm.core.classes import OTHERPROP
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import is_flattening
 from pbrs_farm.core.house import (
@@ -44,6 +44,7 @@ from pbrs_farm.read.common.room_floors import floor_height, floor_polygon
 from pbrs_farm.read.common.room_limits import check_number, check_unit
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.common.structure_items import CLASS_OF_STRUCTURE, structure_item
 from pbrs_farm.read.front3d.front_file import FrontFile, FrontMesh, front_file
 from pbrs_farm.read.front3d.front_openings import HOLE_TYPES, holes_with_names
 from pbrs_farm.read.front3d.front_pieces import (
@@ -115,7 +116,7 @@ def read_front3d(given: GivenFile, fields: ReadFields) -> House:
     structure = _Structure(house, paints, notes)
     rooms, parts = structure.rooms(path.name)
     builder = HouseBuilder(path.name, fields, notes, materials.library)
-    id_of_room = builder.set_rooms(rooms)
+    builder.set_rooms(rooms)
     holes, walls = structure.walls(path.name)
     pieces = FrontModels(model_root, materials, notes, fields)
     furniture = [
@@ -129,21 +130,12 @@ def read_front3d(given: GivenFile, fields: ReadFields) -> House:
     items = [*walls, *parts, *structure.trim(), *furniture]
     areas = {r.id: float(shapely.Polygon(r.polygon).area) for r in rooms}
     items += light_items(house.lights, items, areas, {r.id: r.ceiling_y for r in rooms})
-    builder.items += [_sort_by_names(i, builder, id_of_room) for i in items]
+    for item in items:
+        builder.add(item, _foot(item))
     for hole in holes:
         builder.add_hole(hole)
     source = Source("front3d", path.name, keys.sha256(data), licence="research only")
     return builder.house(path.stem, source, name=house.uid)
-
-
-def _sort_by_names(item: Item, builder: HouseBuilder, id_of_room: Mapping[str, str]) -> Item:
-    """The item with its level and its room, both of which it knows by the file's names alone."""
-    tags = []
-    for tag in item.tags:
-        word, _, name = tag.partition(":")
-        tags.append(f"{word}:{id_of_room.get(name, name)}" if word == "boundary_of" else tag)
-    room_id = id_of_room.get(item.room_id or "")
-    return replace(item, level_id=builder.level_of(_foot(item)), room_id=room_id, tags=tuple(tags))
 
 
 def _foot(item: Item) -> float:
@@ -257,16 +249,9 @@ class _Structure:
                 high = high if high > low + 1.0 else low + _STOREY_M
                 material = self._paints.index("")
                 over = [horizontal("ceiling", [[polygon]], high, material, up=False)]
-            parts.append(
-                _front_structure_item(
-                    f"{front_room.id}_floor", ItemKind.FLOOR, surfaces, front_room.id
-                )
-            )
-            parts.append(
-                _front_structure_item(
-                    f"{front_room.id}_ceiling", ItemKind.CEILING, over, front_room.id
-                )
-            )
+            room_id = front_room.id
+            for kind, shown in ((ItemKind.FLOOR, surfaces), (ItemKind.CEILING, over)):
+                parts.append(structure_item(f"{room_id}_{kind}", kind, shown, room_id=room_id))
             area = shapely.Polygon(polygon)
             self._areas[front_room.id] = area
             if area.area < _LEAST_ROOM_M2:
@@ -335,9 +320,14 @@ class _Structure:
         sheet = piece.sheet
         room = self._paints.index(sheet.mesh.material)
         behind = room if piece.back is None else self._paints.index(piece.back.mesh.material)
-        surfaces = solid_of(piece, pieces, (room, behind, room))
-        item = _front_structure_item(f"wall_{k}", ItemKind.WALL, surfaces, sheet.room)
-        return replace(item, source_class="WallInner", tags=(f"boundary_of:{sheet.room}",))
+        return structure_item(
+            f"wall_{k}",
+            ItemKind.WALL,
+            solid_of(piece, pieces, (room, behind, room)),
+            source_class="WallInner",
+            room_id=sheet.room,
+            boundary_of=(sheet.room,),
+        )
 
     def trim(self) -> list[Item]:
         """All other visible meshes: skirting, dropped ceilings, columns, fitted cupboards."""
@@ -355,8 +345,9 @@ class _Structure:
             uvs = _planar_uvs(mesh.points) if uvs is None else uvs
             is_lamp = mesh_class is not None and mesh_class.kind == "lamp"
             if is_lamp:
-                material = replace(self.material(index), kind=MaterialKind.BULB)
-                index = self._paints.library.index(material)
+                library = self._paints.library
+                bulb = replace(library.materials[index], kind=MaterialKind.BULB)
+                index = library.index(bulb)
             surface = Surface(
                 mesh.kind, mesh.points.astype(np.float32), mesh.faces, index, uvs.astype(np.float32)
             )
@@ -380,34 +371,14 @@ class _Structure:
                     room_id=mesh.room,
                     lights=lights,
                     tags=("structure",)
-                    if mesh_class is not None and mesh_class.nyu40 in (WALL, FLOOR, CEILING)
+                    if mesh_class is not None and mesh_class.nyu40 in CLASS_OF_STRUCTURE.values()
                     else (),
                 )
             )
         return items
-
-    def material(self, index: int) -> Material:
-        """The material of an index."""
-        return self._paints.library.materials[index]
 
 
 def _planar_uvs(points: F64) -> F64:
     """One metre a repeat on the plane that the mesh fills most."""
     axes = np.sort(np.argsort(np.ptp(points, axis=0))[1:])
     return np.asarray(points[:, axes], np.float64)
-
-
-def _front_structure_item(
-    item_id: str, kind: ItemKind, surfaces: Sequence[Surface], room: str
-) -> Item:
-    nyu40 = {ItemKind.WALL: WALL, ItemKind.FLOOR: FLOOR, ItemKind.CEILING: CEILING}[kind]
-    return Item(
-        id=item_id,
-        name=kind.value,
-        kind=kind,
-        level_id="0",
-        surfaces=tuple(surfaces),
-        nyu40=nyu40,
-        source_class=kind.value.title(),
-        room_id=room,
-    )

@@ -14,9 +14,10 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import linear_from_srgb
-from pbrs_farm.formats.glb import GlbWriter, Gltf
+from pbrs_farm.formats.glb import Gltf
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import SourceFiles, read_mtl
+from pbrs_farm.read.gltf.scene_writer import SceneWriter, matrix_row
 from pbrs_farm.read.mesh.mtl import ObjMaterial, laid
 from pbrs_farm.read.mesh.obj import Mesh, parse_obj
 from pbrs_farm.read.mesh.stl import parse_stl
@@ -39,8 +40,7 @@ def gltf_of_mesh(
         red, green, blue, opacity = map(float, rgba)
         mtl = {_GIVEN: ObjMaterial(_GIVEN, (red, green, blue), d=opacity)}
         meshes = tuple(replace(mesh, material=_GIVEN) for mesh in meshes)
-    document, writer = document_of_groups([("", meshes)], mtl, np.eye(4))
-    return writer.gltf(document, name)
+    return gltf_of_groups([("", meshes)], mtl, np.eye(4), name)
 
 
 def files_of_obj(data: bytes, folder: RootFolder, name: str, files: SourceFiles) -> set[str]:
@@ -72,48 +72,31 @@ def _libraries(references: Sequence[str], folder: RootFolder, name: str) -> list
     return list(dict.fromkeys(libraries))
 
 
-def document_of_groups(
-    groups: Iterable[tuple[str, Sequence[Mesh]]], mtl: Mapping[str, ObjMaterial], matrix: F64
-) -> tuple[dict[str, Any], GlbWriter]:
+def gltf_of_groups(
+    groups: Iterable[tuple[str, Sequence[Mesh]]],
+    mtl: Mapping[str, ObjMaterial],
+    matrix: F64,
+    file: str,
+) -> Gltf:
     """The document of groups, each with its name, below a node that turns and scales them."""
-    writer = GlbWriter()
-    nodes: list[dict[str, Any]] = []
-    meshes: list[dict[str, Any]] = []
+    scene = SceneWriter(file)
     images: list[dict[str, str]] = []
     numbers = {name: k for k, name in enumerate(mtl)}
-    materials = [_material(m, images) for m in mtl.values()]
+    scene.materials += [_material(m, images) for m in mtl.values()]
     for name, parts in groups:
         primitives = []
         for part in parts:
             mesh = laid(part, mtl.get(part.material))
-            row: dict[str, Any] = {
-                "attributes": {
-                    "POSITION": writer.add_vertices(
-                        mesh.positions.astype(np.float32), with_bounds=True
-                    ),
-                    "NORMAL": writer.add_vertices(mesh.normals.astype(np.float32)),
-                },
-                "indices": writer.add_faces(mesh.faces),
-            }
-            if mesh.uvs is not None:
-                uvs = (mesh.uvs * (1, -1) + (0, 1)).astype(np.float32)
-                row["attributes"]["TEXCOORD_0"] = writer.add_vertices(uvs)
-            if mesh.material in numbers:
-                row["material"] = numbers[mesh.material]
-            primitives.append(row)
-        nodes.append({"name": name, "mesh": len(meshes)})
-        meshes.append({"primitives": primitives})
-    nodes.append({"children": list(range(len(nodes))), "matrix": matrix.T.ravel().tolist()})
-    return {
-        "asset": {"version": "2.0"},
-        "scene": 0,
-        "scenes": [{"nodes": [len(nodes) - 1]}],
-        "nodes": nodes,
-        "meshes": meshes,
-        "materials": materials,
-        "images": images,
-        "textures": [{"source": k} for k in range(len(images))],
-    }, writer
+            uvs = None if mesh.uvs is None else mesh.uvs * (1, -1) + (0, 1)
+            attributes = scene.add_attributes(mesh.positions, mesh.normals, uvs)
+            number = numbers.get(mesh.material)
+            primitives.append(scene.primitive(attributes, mesh.faces.astype(np.int64), number))
+        scene.nodes.append({"name": name, "mesh": len(scene.meshes)})
+        scene.meshes.append({"primitives": primitives})
+    root = len(scene.nodes)
+    scene.nodes.append({"children": list(range(root)), "matrix": matrix_row(matrix)})
+    textures = [{"source": k} for k in range(len(images))]
+    return scene.gltf(root, images=images, textures=textures)
 
 
 def _material(material: ObjMaterial, images: list[dict[str, str]]) -> dict[str, Any]:

@@ -130,7 +130,10 @@ def house_of_gltf(
     # Sort rooms into levels and items into rooms.
     builder = HouseBuilder(name, fields, notes, materials.library)
     builder.set_rooms(house_rooms)
-    builder.items += [_sort_by_place(item, builder) for item in items]
+    for item in items:
+        extent = _extent(item)
+        middle = None if item.kind is ItemKind.WALL else extent.mean(0)
+        builder.add(item, float(extent[0, 1]), middle)
     return builder.house(stem, source, openings=openings(items))
 
 
@@ -159,13 +162,6 @@ def _of_its_size(items: Sequence[Item], kind: str) -> str:
     is_usual = _SMALL_M < wide < _LARGE_M
     unit = "but glTF is in metres: scale it" if kind == "gltf" else "by its unit: is that right?"
     return "" if is_usual else f"it is {wide:.3g} m large, {unit}; or "
-
-
-def _sort_by_place(item: Item, builder: HouseBuilder) -> Item:
-    """The item with its level, and its room unless it is a wall."""
-    extent = _extent(item)
-    room_id = None if item.kind is ItemKind.WALL else builder.room_at(extent.mean(0))
-    return replace(item, level_id=builder.level_of(float(extent[0, 1])), room_id=room_id)
 
 
 def _extent(item: Item) -> F64:

@@ -12,16 +12,16 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Item, ItemKind, Surface
 from pbrs_farm.read.common.furniture_classes import PieceSize
 from pbrs_farm.read.common.name_classes import UNMAPPED, class_of_material_name
-from pbrs_farm.read.common.room_shells import CLASS_OF_STRUCTURE, planar_parts, room_parts
+from pbrs_farm.read.common.room_shells import planar_parts, room_parts
+from pbrs_farm.read.common.structure_items import CLASS_OF_STRUCTURE
 from pbrs_farm.read.gltf.room_fittings import parted_fittings
 
-_STRUCTURE: Final[tuple[ItemKind, ...]] = (ItemKind.WALL, ItemKind.FLOOR, ItemKind.CEILING)
 _THICKEST_OPENING_M: Final = 1.5  # a porch of glass has less
 
 
 def centres_of(items: Sequence[Item]) -> F64:
     """(N, 3) centres of items that are not part of a room."""
-    centres = [i.bounds.mean(0) for i in items if i.n_faces and i.kind not in _STRUCTURE]
+    centres = [i.bounds.mean(0) for i in items if i.n_faces and i.kind not in CLASS_OF_STRUCTURE]
     return np.array(centres, np.float64).reshape(-1, 3)
 
 
@@ -34,7 +34,7 @@ def structure_parts(item: Item, others: F64) -> tuple[Item, ...]:
     a room too if it is large enough.
     """
     is_unknown = UNMAPPED in item.tags
-    may_be_room = item.kind in (*_STRUCTURE, ItemKind.GROUND) or is_unknown
+    may_be_room = item.kind in (*CLASS_OF_STRUCTURE, ItemKind.GROUND) or is_unknown
     if not (may_be_room or _is_too_large_for_an_opening(item)):
         return (item,)
     # Parts identified by name or connectivity are not sides of the room, whatever their face
@@ -63,7 +63,11 @@ def _by_materials(item: Item) -> tuple[Item, ...]:
     # Separate wall, floor and ceiling; surfaces with inconclusive names stay with the item.
     groups: dict[ItemKind | None, list[Surface]] = {}
     for surface, material_class in zip(item.surfaces, kinds, strict=True):
-        kind = material_class.kind if material_class and material_class.kind in _STRUCTURE else None
+        kind = (
+            material_class.kind
+            if material_class and material_class.kind in CLASS_OF_STRUCTURE
+            else None
+        )
         groups.setdefault(None if kind is item.kind else kind, []).append(surface)
     if set(groups) == {None}:
         return (_name_by_materials(item),)

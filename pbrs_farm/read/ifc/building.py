@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Final
@@ -46,6 +46,7 @@ from pbrs_farm.read.common.openings import openings, openings_of_voids
 from pbrs_farm.read.common.placed_mesh import across_last, assumed_light, oriented_box, placed
 from pbrs_farm.read.common.room_floors import covered_share, floor_polygon
 from pbrs_farm.read.common.rooms import rooms_from_floors, rooms_from_walls
+from pbrs_farm.read.common.structure_items import structure_item
 from pbrs_farm.read.ifc.ceilings import NEAR_M, ROOF_WORDS, Overheads, with_roofs
 from pbrs_farm.read.ifc.doors_and_windows import (
     glass_parts,
@@ -134,8 +135,12 @@ class _Building:
         builder.set_rooms([room for room, _top in rooms])
         builder.levels = self._named(builder.levels)
         tops = [top for _room, top in rooms]
-        items += self._covers(list(zip(builder.rooms, tops, strict=True)), items, overheads)
-        builder.items += [_sort_product(item, builder) for item in items]
+        for item in items:
+            middle = None if item.kind is ItemKind.WALL else item.bounds.mean(0)
+            builder.add(item, float(item.bounds[0, 1]), middle)
+        for cover in self._covers(zip(builder.rooms, tops, strict=True), items, overheads):
+            level_id = builder.level_of(float(cover.bounds[0, 1]))
+            builder.items.append(replace(cover, level_id=level_id))
         source = Source("ifc", self._path.name, keys.sha256(self._path.read_bytes()))
         return builder.house(self._path.stem, source, openings=self._openings(builder))
 
@@ -446,17 +451,16 @@ class _Building:
         return tuple(named)
 
     def _covers(
-        self, rooms: Sequence[tuple[Room, F64 | None]], items: Sequence[Item], overheads: Overheads
-    ) -> list[Item]:
+        self, rooms: Iterable[tuple[Room, F64 | None]], items: Sequence[Item], overheads: Overheads
+    ) -> Iterator[Item]:
         """A floor or ceiling for each room without one; a slab below a room is its floor, above it hides a ceiling."""
         white = self._library.index(Material("", diffuse=(0.9, 0.9, 0.9), is_default=True))
-        covers: list[Item] = []
         for room, top in rooms:
             is_open = named_kind(" ".join((*room.types, room.name))) is RoomKind.OUTDOOR
             floors = _heights_of_floors(items, room)
             if not floors:
                 surface = horizontal("floor", [[room.polygon]], room.floor_y, white, up=True)
-                covers.append(_floor_or_ceiling_item(room, ItemKind.FLOOR, surface))
+                yield _cover(room, ItemKind.FLOOR, surface)
             above = overheads.over(room)
             near_y = room.ceiling_y + NEAR_M
             is_ceiled = above.share(near_y, of_ceilings=True) > _COVERED
@@ -468,15 +472,7 @@ class _Building:
             else:
                 y = min(room.ceiling_y, slab_y or np.inf) - _BELOW_SLAB_M
                 surface = horizontal("ceiling", [[room.polygon]], y, white, up=False)
-            covers.append(_floor_or_ceiling_item(room, ItemKind.CEILING, surface))
-        return covers
-
-
-def _sort_product(item: Item, builder: HouseBuilder) -> Item:
-    """The item with its level, and its room unless it is a wall."""
-    level_id = builder.level_of(float(item.bounds[0, 1]))
-    room_id = None if item.kind is ItemKind.WALL else builder.room_at(item.bounds.mean(0))
-    return replace(item, level_id=level_id, room_id=item.room_id or room_id)
+            yield _cover(room, ItemKind.CEILING, surface)
 
 
 def _is_nothing(product: Any) -> bool:
@@ -629,17 +625,10 @@ def _looking_down(top: F64, material: int) -> Surface:
     return Surface("ceiling", points.astype(np.float32), faces, material)
 
 
-def _floor_or_ceiling_item(room: Room, kind: ItemKind, surface: Surface) -> Item:
-    nyu40 = FLOOR if kind is ItemKind.FLOOR else CEILING
-    return Item(
-        id=f"{kind}_{room.id}",
-        name=f"{room.name} {kind}".strip(),
-        kind=kind,
-        level_id="",
-        surfaces=(surface,),
-        nyu40=nyu40,
-        source_class="IfcSpace",
-        room_id=room.id,
+def _cover(room: Room, kind: ItemKind, surface: Surface) -> Item:
+    name = f"{room.name} {kind}".strip()
+    return structure_item(
+        f"{kind}_{room.id}", kind, [surface], name=name, source_class="IfcSpace", room_id=room.id
     )
 
 

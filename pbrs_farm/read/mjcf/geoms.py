@@ -3,35 +3,31 @@
 from __future__ import annotations
 
 import re
-from dataclasses import dataclass
+from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
-from pbrs_farm.core.arrays import F64, I64
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import linear_from_srgb
-from pbrs_farm.core.house import Surface
-from pbrs_farm.geometry.solids import box, lathe, quads_surface, sphere
+from pbrs_farm.geometry.solids import box, quads_surface
 from pbrs_farm.images import png_from_array
 from pbrs_farm.quiet_mujoco import mujoco
+from pbrs_farm.read.mesh.shape import (
+    Shape,
+    ball,
+    capsule_profile,
+    cylinder_profile,
+    shape_of_surface,
+    turned,
+)
 from pbrs_farm.regular_files import read_regular
 
-_ROUND: Final = 24  # segments around a round shape
 _GREY: Final = (0.5, 0.5, 0.5, 1.0)  # of geoms that say no colour
 _SHOWN_GROUPS: Final = 3  # geoms of higher groups are not shown by MuJoCo's own viewer either
 _TYPE: Final = mujoco.mjtGeom
 UNREAD: Final = {_TYPE.mjGEOM_HFIELD: "height field", _TYPE.mjGEOM_SDF: "signed distance field"}
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Shape:
-    """Triangles in a geom's own frame, metres."""
-
-    positions: F64  # (V, 3)
-    faces: I64  # (F, 3)
-    uvs: F64 | None = None  # (V, 2), v down
-    normals: F64 | None = None  # (V, 3)
 
 
 def rgba_of(model: Any, geom: int) -> tuple[float, ...]:
@@ -59,44 +55,24 @@ def shape_of(model: Any, geom: int, half_m: F64) -> Shape | None:
     kind, size = _TYPE(int(model.geom_type[geom])), model.geom_size[geom]
     if kind == _TYPE.mjGEOM_MESH:
         return _mesh(model, int(model.geom_dataid[geom]))
-    origin = np.zeros(3)
     if kind == _TYPE.mjGEOM_BOX:
-        surface = box("", origin, np.asarray(size, np.float64), 0)
+        shape = shape_of_surface(box("", np.zeros(3), np.asarray(size, np.float64), 0))
     elif kind == _TYPE.mjGEOM_PLANE:
         w, d = (float(s) if s > 0 else float(h) for s, h in zip(size[:2], half_m, strict=True))
-        surface = quads_surface("", np.array([[[-w, -d, 0], [w, -d, 0], [w, d, 0], [-w, d, 0]]]), 0)
+        quad = np.array([[[-w, -d, 0], [w, -d, 0], [w, d, 0], [-w, d, 0]]])
+        shape = shape_of_surface(quads_surface("", quad, 0))
     elif kind in (_TYPE.mjGEOM_SPHERE, _TYPE.mjGEOM_ELLIPSOID):
-        surface = sphere("", origin, 1.0, 0, n=_ROUND)
+        shape = ball(1.0)
         axes = np.asarray(size if kind == _TYPE.mjGEOM_ELLIPSOID else [size[0]] * 3, np.float64)
-        ball = _of_surface(surface, model, geom)
-        leaning = None if ball.normals is None else ball.normals / axes
-        return Shape(ball.positions * axes, ball.faces, ball.uvs, leaning)
+        leaning = None if shape.normals is None else shape.normals / axes
+        shape = replace(shape, positions=shape.positions * axes, normals=leaning)
     elif kind in (_TYPE.mjGEOM_CYLINDER, _TYPE.mjGEOM_CAPSULE):
-        r, h = float(size[0]), float(size[1])
-        if kind == _TYPE.mjGEOM_CYLINDER:
-            profile = np.array([[0, -h], [r, -h], [r, h], [0, h]], np.float64)
-        else:
-            angles = np.linspace(-np.pi / 2, np.pi / 2, 13)
-            lift = np.where(angles < 0, -h, h)
-            profile = np.column_stack([r * np.cos(angles), r * np.sin(angles) + lift])
-        turned = _of_surface(lathe("", profile, origin, 0, n=_ROUND), model, geom)
-        # A lathe turns about y: its y becomes z.
-        order = [2, 0, 1]
-        normals = None if turned.normals is None else turned.normals[:, order]
-        return Shape(turned.positions[:, order], turned.faces, turned.uvs, normals)
+        profile = cylinder_profile if kind == _TYPE.mjGEOM_CYLINDER else capsule_profile
+        shape = turned(profile(float(size[0]), float(size[1])))
     else:
         return None
-    return _of_surface(surface, model, geom)
-
-
-def _of_surface(surface: Surface, model: Any, geom: int) -> Shape:
-    normals, material = surface.normals, int(model.geom_matid[geom])
-    return Shape(
-        surface.positions.astype(np.float64),
-        surface.faces.astype(np.int64),
-        None if surface.uvs is None else _laid(surface.uvs.astype(np.float64), model, material),
-        None if normals is None else normals.astype(np.float64),
-    )
+    uvs = None if shape.uvs is None else _laid(shape.uvs, model, int(model.geom_matid[geom]))
+    return replace(shape, uvs=uvs)
 
 
 def _laid(uvs_m: F64, model: Any, material: int) -> F64:

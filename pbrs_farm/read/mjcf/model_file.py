@@ -18,9 +18,8 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import Y_UP_FROM_Z_UP, affine
 from pbrs_farm.core.house import House, Source
 from pbrs_farm.core.joints import JointKind
-from pbrs_farm.core.mesh import unit_vectors
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.formats.glb import GlbWriter, Gltf
+from pbrs_farm.formats.glb import Gltf
 from pbrs_farm.home.room_use import named_kind
 from pbrs_farm.quiet_mujoco import mujoco
 from pbrs_farm.read.common.format import GivenFile, root_of
@@ -30,6 +29,7 @@ from pbrs_farm.read.gltf.document import UNREAD
 from pbrs_farm.read.gltf.node_classes import Mapping, collection_of, mapping_from_json
 from pbrs_farm.read.gltf.node_joints import KEY, joint_row
 from pbrs_farm.read.gltf.scene import house_of_gltf, side_files
+from pbrs_farm.read.gltf.scene_writer import SceneWriter, matrix_row
 from pbrs_farm.read.mjcf.geoms import UNREAD as UNREAD_SHAPES
 from pbrs_farm.read.mjcf.geoms import (
     is_endless,
@@ -52,7 +52,6 @@ _KINDS: Final = {
 _FLAT_M: Final = 0.02  # maximum height of a room's floor geom, metres
 _LEAST_ROOM_M: Final = 2.0  # minimum size of a room; a smaller body with a room's name is an item, such as a kitchen unit
 _MOST_JSON_BYTES: Final = 16 * 2**20
-_LIGHTS: Final = "KHR_lights_punctual"
 
 
 def read_mjcf(given: GivenFile, fields: ReadFields) -> House:
@@ -123,15 +122,11 @@ class _Scene:
     ) -> None:
         self._model, self._data, self._file = model, data, file
         self._notes, self._fields = notes, fields
-        self._writer = GlbWriter()
-        turn = Y_UP_FROM_Z_UP.T.ravel().tolist()
-        self._nodes: list[_Row] = [{"name": "", "matrix": turn, "children": []}]
-        self._meshes: list[_Row] = []
-        self._materials: list[_Row] = []
+        self._scene = SceneWriter(file)
+        turn = matrix_row(Y_UP_FROM_Z_UP)
+        self._scene.nodes.append({"name": "", "matrix": turn, "children": []})
         self._textures: dict[int, int] = {}  # of the model -> of the document
         self._known: dict[Any, int] = {}
-        self._lights: list[_Row] = []
-        self._n_triangles = 0
         self._unread: dict[str, int] = {}
         self._children: dict[int, list[int]] = {}
         for body in range(1, model.nbody):
@@ -171,19 +166,9 @@ class _Scene:
         self._group(0, 0)
         for kind, n in self._unread.items():
             self._notes.add(UNREAD, kind, f"{n} geoms are {kind}s, which are not read")
-        extensions = {_LIGHTS: {"lights": self._lights}} if self._lights else {}
-        document = {
-            "asset": {"version": "2.0"},
-            "scene": 0,
-            "scenes": [{"nodes": [0]}],
-            "nodes": self._nodes,
-            "meshes": self._meshes,
-            "materials": self._materials,
-            "extensions": extensions,
-            "textures": [{"source": k} for k in range(len(self._textures))],
-            "images": [{"uri": str(k)} for k in self._textures],
-        }
-        return self._writer.gltf(document, self._file)
+        textures = [{"source": k} for k in range(len(self._textures))]
+        images = [{"uri": str(k)} for k in self._textures]
+        return self._scene.gltf(0, textures=textures, images=images)
 
     def _group(self, body: int, above: int) -> None:
         """Add the members of a grouping body separately: its geoms, and its child bodies."""
@@ -202,7 +187,7 @@ class _Scene:
             may_be_floor = is_room or is_endless(self._model, geom)
             if may_be_floor and class_of_node_name(name) is None and self._height(geom) < _FLAT_M:
                 node["extras"] = {"class": "floor"}
-            self._add(node, above)
+            self._scene.add_node(node, above)
         for child in self._children.get(body, []):
             if self._is_group(child):
                 self._group(child, above)
@@ -238,18 +223,20 @@ class _Scene:
             words = [*map(self._words, geoms), *map(self._body_name, self._below(body))]
             name = next((w for w in words if class_of_node_name(w) is not None), name)
         root: _Row = {"name": name or f"body {body}", "children": [], "extras": extras}
-        number = self._add(root, above)
+        number = self._scene.add_node(root, above)
         self._parts(body, number, is_moving=False)
 
     def _parts(self, body: int, above: int, *, is_moving: bool) -> None:
         """Add the geoms of a body and its descendants; parts with a joint get a separate node."""
         joint = None if is_moving else self._joint(body)
         if joint is not None:
-            above = self._add({"name": "", "children": [], "extras": {KEY: joint}}, above)
+            above = self._scene.add_node(
+                {"name": "", "children": [], "extras": {KEY: joint}}, above
+            )
         for geom in self._geoms.get(body, []):
-            self._add(self._geom_node(geom), above)
+            self._scene.add_node(self._geom_node(geom), above)
         for light in self._lights_of(body, below=False):
-            self._add(self._light_node(light), above)
+            self._scene.add_node(self._light_node(light), above)
         for child in self._children.get(body, []):
             self._parts(child, above, is_moving=is_moving or joint is not None)
 
@@ -278,7 +265,7 @@ class _Scene:
         matrix = affine(self._data.geom_xmat[geom].reshape(3, 3), self._data.geom_xpos[geom])
         if is_endless(self._model, geom):
             matrix[:2, 3] = ((self._low + self._high) / 2)[:2]
-        node: _Row = {"name": "", "matrix": matrix.T.ravel().tolist()}
+        node: _Row = {"name": "", "matrix": matrix_row(matrix)}
         mesh = self._mesh(geom)
         return node if mesh is None else node | {"mesh": mesh}
 
@@ -296,28 +283,10 @@ class _Scene:
         shape = shape_of(model, geom, (self._high - self._low)[:2] / 2)
         if shape is None or not len(shape.faces):
             return None
-        self._n_triangles += len(shape.faces)
-        most, of_one = self._fields.max_triangles, self._fields.max_model_triangles
-        if self._n_triangles > most or len(shape.faces) > of_one:
-            limit = "read.max_triangles" if self._n_triangles > most else "read.max_model_triangles"
-            text = f"more than {most if self._n_triangles > most else of_one} triangles"
-            raise BadHouse(
-                self._file, f"geom {self._words(geom)[:60]}", text, hint=f"limit: {limit}"
-            )
-        add = self._writer.add_vertices
-        attributes = {"POSITION": add(shape.positions.astype(np.float32), with_bounds=True)}
-        if shape.normals is not None:
-            attributes["NORMAL"] = add(unit_vectors(shape.normals).astype(np.float32))
-        if shape.uvs is not None:
-            attributes["TEXCOORD_0"] = add(shape.uvs.astype(np.float32))
-        row = {
-            "attributes": attributes,
-            "indices": self._writer.add_faces(shape.faces.astype(np.int32)),
-            "material": self._material(geom),
-        }
-        self._meshes.append({"primitives": [row]})
-        self._known[key] = len(self._meshes) - 1
-        return len(self._meshes) - 1
+        parts = [(shape.faces, self._material(geom))]
+        place = f"geom {self._words(geom)[:60]}"
+        self._known[key] = self._scene.add_mesh(shape, parts, place, self._fields)
+        return self._known[key]
 
     def _material_key(self, geom: int) -> tuple[Any, ...]:
         return (int(self._model.geom_matid[geom]), tuple(self._model.geom_rgba[geom].tolist()))
@@ -328,8 +297,8 @@ class _Scene:
             texture = texture_of(self._model, geom)
             if texture is not None:
                 texture = self._textures.setdefault(texture, len(self._textures))
-            self._materials.append(material_row(self._model, geom, texture))
-            self._known[key] = len(self._materials) - 1
+            self._scene.materials.append(material_row(self._model, geom, texture))
+            self._known[key] = len(self._scene.materials) - 1
         return self._known[key]
 
     def _lights_of(self, body: int, *, below: bool = True) -> list[int]:
@@ -347,20 +316,13 @@ class _Scene:
         colour = np.asarray(self._model.light_diffuse[light], np.float64)
         colour = colour / max(float(colour.max()), 1e-6)
         row = {"type": "point", "color": colour.tolist(), "extras": {"assumed": True}}
-        self._lights.append(row)
         place = self._data.light_xpos[light].tolist()
-        number = len(self._lights) - 1
-        return {"name": "", "translation": place, "extensions": {_LIGHTS: {"light": number}}}
+        return {"name": "", "translation": place} | self._scene.add_light(row)
 
     def _below(self, body: int) -> Iterator[int]:
         yield body
         for child in self._children.get(body, []):
             yield from self._below(child)
-
-    def _add(self, node: _Row, above: int) -> int:
-        self._nodes[above].setdefault("children", []).append(len(self._nodes))
-        self._nodes.append(node)
-        return len(self._nodes) - 1
 
     def _body_name(self, body: int) -> str:
         return name_of(self._model, _OBJECT.mjOBJ_BODY, body)

@@ -23,7 +23,7 @@ from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.gltf.node_classes import Mapping
-from pbrs_farm.read.gltf.obj_document import document_of_groups, files_of_obj, materials_of_obj
+from pbrs_farm.read.gltf.obj_document import files_of_obj, gltf_of_groups, materials_of_obj
 from pbrs_farm.read.gltf.scene import house_of_gltf
 from pbrs_farm.read.mesh.obj import Mesh, parse_obj
 from pbrs_farm.regular_files import MAX_SCENE_BYTES
@@ -62,10 +62,9 @@ def read_obj_home(given: GivenFile, fields: ReadFields) -> House:
         notes.add("assumed-unit", path.name, guess)
     # Words that modelling programs add are left out of names.
     named = [(_FILLERS.sub(" ", name).strip() or name, ms) for name, ms in groups.items()]
-    document, writer = document_of_groups(named, mtl, matrix)
     source = Source("obj-home", path.name, keys.sha256(data))
     return house_of_gltf(
-        writer.gltf(document, path.name),
+        gltf_of_groups(named, mtl, matrix, path.name),
         source,
         path.stem,
         fields,

@@ -11,18 +11,18 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.joints import JointKind
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
-from pbrs_farm.geometry.solids import box, lathe, sphere
+from pbrs_farm.geometry.solids import box
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.gltf.assembly import Assembly, files_of_asset
 from pbrs_farm.read.gltf.node_joints import KEY, joint_row
-from pbrs_farm.read.gltf.obj_document import document_of_groups
+from pbrs_farm.read.gltf.obj_document import gltf_of_groups
 from pbrs_farm.read.mesh.mtl import ObjMaterial
 from pbrs_farm.read.mesh.obj import Mesh
+from pbrs_farm.read.mesh.shape import ball, cylinder_profile, shape_of_surface, turned
 from pbrs_farm.read.robot.urdf import Robot, Solid, Visual
 
 PLANE: Final = "plane"
-_ROUND: Final = 24  # segments around a round shape
 RootsOf = Callable[[Visual], "list[int] | None"]
 """The model of a visual -> its root nodes; None without the file."""
 
@@ -97,23 +97,17 @@ def files_of_robot(robot: Robot, folder: RootFolder, urdf: str, files: SourceFil
 
 def solid_roots(built: Assembly, solid: Solid) -> list[int]:
     """The root nodes of a box, cylinder or ball."""
-    origin, colour = np.zeros(3), ObjMaterial("solid", solid.rgba[:3], d=solid.rgba[3])
+    colour = ObjMaterial("solid", solid.rgba[:3], d=solid.rgba[3])
     if solid.kind == "box":
-        surface = box("", origin, np.array(solid.size) / 2, 0)
+        shape = shape_of_surface(box("", np.zeros(3), np.array(solid.size) / 2, 0))
     elif solid.kind == "sphere":
-        surface = sphere("", origin, solid.size[0], 0, n=_ROUND)
+        shape = ball(solid.size[0])
     else:
-        radius, half = solid.size[0], solid.size[1] / 2
-        profile = np.array([[0, -half], [radius, -half], [radius, half], [0, half]])
-        surface = lathe("", profile, origin, 0, n=_ROUND)
-    # A lathe turns about y: its y becomes z.
-    order = [2, 0, 1] if solid.kind == "cylinder" else [0, 1, 2]
-    points = surface.positions[:, order].astype(np.float64)
-    if surface.normals is None:
+        shape = turned(cylinder_profile(solid.size[0], solid.size[1] / 2))
+    points, faces, normals = shape.positions, shape.faces.astype(np.int32), shape.normals
+    if normals is None:
         normals = np.zeros_like(points)
-        normals[surface.faces] = unit_normals(triangle_corners(points, surface.faces))[:, None]
-    else:
-        normals = surface.normals[:, order].astype(np.float64)
-    mesh = Mesh("", colour.name, points, surface.faces, None, normals)
-    document, writer = document_of_groups([("", [mesh])], {colour.name: colour}, np.eye(4))
-    return built.added(str(solid), writer.gltf(document, built.file))
+        normals[faces] = unit_normals(triangle_corners(points, faces))[:, None]
+    mesh = Mesh("", colour.name, points, faces, None, normals)
+    gltf = gltf_of_groups([("", [mesh])], {colour.name: colour}, np.eye(4), built.file)
+    return built.added(str(solid), gltf)

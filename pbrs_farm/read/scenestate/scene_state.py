@@ -6,7 +6,7 @@ a folder, or stand-ins by their category.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
 from typing import Any, Final
@@ -16,7 +16,6 @@ import shapely
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House, Item, ItemKind, Room, Source, Surface
 from pbrs_farm.core.recipe import ReadFields
@@ -38,6 +37,7 @@ from pbrs_farm.read.common.room_limits import check_number, check_unit
 from pbrs_farm.read.common.rooms import room_at
 from pbrs_farm.read.common.root_folder import RootFolder
 from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.common.structure_items import structure_item
 from pbrs_farm.read.scenestate.scene_document import (
     ArchMaterials,
     SceneDocument,
@@ -88,13 +88,12 @@ def read_scenestate(given: GivenFile, fields: ReadFields) -> House:
     shell = _Shell(document, materials, notes)
     rooms, parts = shell.rooms(path.name)
     builder = HouseBuilder(path.name, fields, notes, materials.library)
-    id_of_room = builder.set_rooms(rooms)
+    builder.set_rooms(rooms)
     structure = [*shell.walls(), *parts]
     holes = shell.holes(builder.rooms)
     objects, missing = _object_items(document, path, models, shell, notes, fields)
-    builder.items += [
-        _sort_by_name_or_place(i, builder, id_of_room) for i in (*structure, *objects)
-    ]
+    for item in (*structure, *objects):
+        _add_item(item, builder)
     for hole in holes:
         low = hole.centre[1] - hole.size[1] / 2
         builder.add_hole(hole, foot_y=low + 0.1, cut_y=hole.centre[1])
@@ -149,24 +148,12 @@ def _check_number(document: SceneDocument, file: str) -> None:
             raise BadHouse(file, "scene.arch.elements", f"{n} {noun}, at most {most} are read")
 
 
-def _sort_by_name_or_place(
-    item: Item, builder: HouseBuilder, id_of_room: Mapping[str, str]
-) -> Item:
-    """The item with its level and room, by the room's name in the file, else by position."""
+def _add_item(item: Item, builder: HouseBuilder) -> None:
     box = item.oriented_box if item.surfaces or item.box else None
     centre = np.zeros(3) if box is None else box.centre
     low = centre[1] if box is None else float(box.corners[:, 1].min())
-    level = builder.level_of(low + (0.1 if item.kind is not ItemKind.CEILING else -1.0))
-    room_id = id_of_room.get(item.room_id) if item.room_id is not None else None
-    if item.room_id is None and not item.kind.is_structure:
-        room_id = builder.room_at(centre)
-    tags = tuple(_renamed(tag, id_of_room) for tag in item.tags)
-    return replace(item, level_id=level, room_id=room_id, tags=tags)
-
-
-def _renamed(tag: str, renamed: Mapping[str, str]) -> str:
-    word, _, name = tag.partition(":")
-    return f"{word}:{renamed.get(name, name)}" if word == "boundary_of" else tag
+    foot_y = low + (0.1 if item.kind is not ItemKind.CEILING else -1.0)
+    builder.add(item, foot_y, None if item.kind.is_structure else centre)
 
 
 class _Shell:
@@ -209,13 +196,9 @@ class _Shell:
         """An item for each wall."""
         items = []
         for wall in self._standing:
-            surfaces = wall_surfaces(_AS_IT_STANDS, wall.element, wall.frame, self.materials)
-            if surfaces:
+            if surfaces := self._wall_faces(wall):
                 only_room = wall.rooms[0] if len(wall.rooms) == 1 else None
-                tags = tuple(f"boundary_of:{room}" for room in wall.rooms)
-                items.append(
-                    _scene_structure_item(wall.id, ItemKind.WALL, surfaces, only_room, tags)
-                )
+                items.append(_part_of_room(wall.id, ItemKind.WALL, surfaces, only_room, wall.rooms))
         return items
 
     def rooms(self, file: str) -> tuple[list[Room], list[Item]]:
@@ -255,12 +238,15 @@ class _Shell:
         ceilings: list[tuple[SceneElement, Any]],
         walls: list[tuple[StandingWall, Surface]],
     ) -> tuple[Room, list[Item]] | None:
-        parts = []
-        for k, floor in enumerate(floors):
-            surfaces = slab_surfaces(_AS_IT_STANDS, floor.element, self.materials)
+        parts: list[Item] = []
+
+        def add(item_id: str, kind: ItemKind, element: Element) -> None:
+            surfaces = slab_surfaces(_AS_IT_STANDS, element, self.materials)
             if surfaces:
-                item_id = floor.id if k == 0 else f"{floor.id}.{k}"
-                parts.append(_scene_structure_item(item_id, ItemKind.FLOOR, surfaces, name))
+                parts.append(_part_of_room(item_id, kind, surfaces, name))
+
+        for k, floor in enumerate(floors):
+            add(f"{floor.id}.{k}" if k else floor.id, ItemKind.FLOOR, floor.element)
         faces = [s for part in parts for s in part.surfaces]
         low = floor_height(faces)
         if low is None:
@@ -283,30 +269,16 @@ class _Shell:
         own_ceilings = [e for e in ceilings if name in e[0].rooms]
         tops = sorted(w.frame.start[1] + w.element.height_m for w, _ in near)
         top = float(tops[len(tops) // 2]) if tops else low + _STOREY_M
-        if own_ceilings:
-            for e, _ in own_ceilings:
-                surfaces = slab_surfaces(_AS_IT_STANDS, e.element, self.materials)
-                parts += (
-                    [_scene_structure_item(e.id, ItemKind.CEILING, surfaces, name)]
-                    if surfaces
-                    else []
-                )
-        elif not above:
-            for k, floor in enumerate(floors):
-                ceiling = _ceiling_over(floor.element, max(top, low + 1.0))
-                surfaces = slab_surfaces(_AS_IT_STANDS, ceiling, self.materials)
-                parts.append(
-                    _scene_structure_item(
-                        f"{floor.id}_ceiling{k}", ItemKind.CEILING, surfaces, name
-                    )
-                )
-        else:
+        for e, _ in own_ceilings:
+            add(e.id, ItemKind.CEILING, e.element)
+        if not own_ceilings:
             for e in above:
                 if not e.rooms:
-                    surfaces = slab_surfaces(_AS_IT_STANDS, e.element, self.materials)
-                    parts.append(
-                        _scene_structure_item(f"{e.id}_{name}", ItemKind.CEILING, surfaces, name)
-                    )
+                    add(f"{e.id}_{name}", ItemKind.CEILING, e.element)
+        if not own_ceilings and not above:
+            for k, floor in enumerate(floors):
+                ceiling = _ceiling_over(floor.element, max(top, low + 1.0))
+                add(f"{floor.id}_ceiling{k}", ItemKind.CEILING, ceiling)
         high = ceiling_height([s for p in parts if p.kind is ItemKind.CEILING for s in p.surfaces])
         high = top if high is None else high
         types = self._document.room_types.get(name, ())
@@ -365,24 +337,15 @@ class _Shell:
         )
 
 
-def _scene_structure_item(
+def _part_of_room(
     item_id: str,
     kind: ItemKind,
     surfaces: tuple[Surface, ...],
     room: str | None,
-    tags: tuple[str, ...] = (),
+    boundary_of: Sequence[str] = (),
 ) -> Item:
-    return Item(
-        id=item_id,
-        name=f"{kind.value} {room or ''}".strip(),
-        kind=kind,
-        level_id="0",
-        surfaces=surfaces,
-        nyu40=NYU40_NAMES.index(kind.value),
-        source_class=kind.value.title(),
-        room_id=room,
-        tags=tags,
-    )
+    name = f"{kind.value} {room or ''}".strip()
+    return structure_item(item_id, kind, surfaces, name=name, room_id=room, boundary_of=boundary_of)
 
 
 def _ceiling_over(floor: Element, top: float) -> Element:

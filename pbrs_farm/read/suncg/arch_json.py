@@ -17,7 +17,6 @@ from pydantic import Field
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.checked_json import checked, json_from_bytes
-from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Item, ItemKind, Opening
 from pbrs_farm.read.common.arch_elements import (
@@ -33,6 +32,7 @@ from pbrs_farm.read.common.arch_elements import (
 from pbrs_farm.read.common.json_values import Axes
 from pbrs_farm.read.common.model_materials import ModelMaterials
 from pbrs_farm.read.common.openings import CUTTER_REACH_M, LEAST_HOLE_M, box_between
+from pbrs_farm.read.common.structure_items import structure_item
 from pbrs_farm.read.suncg.house_json import Node
 
 MAX_ELEMENTS: Final = 100_000
@@ -70,17 +70,15 @@ def arch_items(arch: Arch, node: Node, room_id: str, materials: ModelMaterials) 
         )
         if not surfaces:
             continue
-        is_ground = e.kind == "Ground"
-        yield Item(
-            id=item_id,
+        yield structure_item(
+            item_id,
+            KIND_OF_ELEMENT[e.kind],
+            surfaces,
             name=f"{e.kind.lower()} {room_id}",
-            kind=KIND_OF_ELEMENT[e.kind],
             level_id=node.level_id,
-            surfaces=surfaces,
-            nyu40=0 if is_ground else NYU40_NAMES.index(e.kind.lower()),
             source_class=f"{node.model_id} {e.kind}",
-            room_id=None if is_ground else room_id,
-            tags=(f"boundary_of:{room_id}",) if e.kind == "Wall" else (),
+            room_id=None if e.kind == "Ground" else room_id,
+            boundary_of=(room_id,) if e.kind == "Wall" else (),
         )
 
 

@@ -10,7 +10,7 @@ from typing import Final, TypeVar
 import numpy as np
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.classes import MIRROR, NYU40_NAMES, OTHERPROP
+from pbrs_farm.core.classes import MIRROR, OTHERPROP
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import Item, ItemKind, LightPart, Material, MaterialKind, Surface
 from pbrs_farm.home.names import words_of
@@ -20,6 +20,7 @@ from pbrs_farm.read.common.model_materials import ModelMaterials
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.placed_mesh import oriented_box, placed
 from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.structure_items import structure_item
 from pbrs_farm.read.mesh.mtl import ObjMaterial
 from pbrs_farm.read.suncg.arch_json import arch_items
 from pbrs_farm.read.suncg.house_json import Node
@@ -238,11 +239,12 @@ def ground_item(context: ReaderContext, node: Node) -> Item | None:
         return None
     if context.arch is not None:
         return next(arch_items(context.arch, node, node.id, context.materials), None)
-    surfaces = room_surfaces(context, node, "f", default_walls=False)
-    if not surfaces:
-        return None
-    parts = tuple(s for _, s in surfaces)
-    return Item(node.id, "ground", ItemKind.GROUND, node.level_id, parts, UNLABELLED, node.model_id)
+    surfaces = [s for _, s in room_surfaces(context, node, "f", default_walls=False)]
+    level_id, name = node.level_id, node.model_id
+    ground = structure_item(
+        node.id, ItemKind.GROUND, surfaces, level_id=level_id, source_class=name
+    )
+    return ground if surfaces else None
 
 
 def room_surfaces(
@@ -287,7 +289,7 @@ def room_items(context: ReaderContext, node: Node, room_id: str) -> Iterator[Ite
             continue
         surfaces = room_surfaces(context, node, part, default_walls=False)
         if surfaces:
-            yield _suncg_structure_item(node, room_id, part, kind, tuple(s for _, s in surfaces))
+            yield _part_of_room(node, room_id, part, kind, [s for _, s in surfaces])
     # The inside and outside slabs of one wall share its number, so they are one item.
     walls: dict[str, list[Surface]] = {}
     if "Walls" not in node.hidden:
@@ -295,22 +297,19 @@ def room_items(context: ReaderContext, node: Node, room_id: str) -> Iterator[Ite
             match = _WALL_GROUP.fullmatch(group)
             walls.setdefault(match[1] if match else "", []).append(surface)
     for number, parts_of_wall in walls.items():
-        yield _suncg_structure_item(
-            node, room_id, f"w{number}", ItemKind.WALL, tuple(parts_of_wall)
-        )
+        yield _part_of_room(node, room_id, f"w{number}", ItemKind.WALL, parts_of_wall)
 
 
-def _suncg_structure_item(
-    node: Node, room_id: str, part: str, kind: ItemKind, surfaces: tuple[Surface, ...]
+def _part_of_room(
+    node: Node, room_id: str, part: str, kind: ItemKind, surfaces: list[Surface]
 ) -> Item:
-    return Item(
-        id=f"{room_id}{part}",
+    return structure_item(
+        f"{room_id}{part}",
+        kind,
+        surfaces,
         name=f"{kind.value} {room_id}",
-        kind=kind,
         level_id=node.level_id,
-        surfaces=surfaces,
-        nyu40=NYU40_NAMES.index(kind.value),
         source_class=f"{node.model_id}{part}",
         room_id=room_id,
-        tags=(f"boundary_of:{room_id}",) if kind is ItemKind.WALL else (),
+        boundary_of=(room_id,) if kind is ItemKind.WALL else (),
     )

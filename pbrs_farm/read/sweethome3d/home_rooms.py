@@ -8,10 +8,10 @@ import numpy as np
 import shapely
 
 from pbrs_farm.core.arrays import Points2
-from pbrs_farm.core.classes import CEILING, FLOOR
 from pbrs_farm.core.house import Item, ItemKind, Room, Surface
 from pbrs_farm.geometry.doorways import door_line, ground_between
 from pbrs_farm.geometry.plan_surfaces import counter_clockwise, horizontal, polygons_in
+from pbrs_farm.read.common.structure_items import structure_item
 from pbrs_farm.read.sweethome3d.ceiling_heights import CeilingHeights
 from pbrs_farm.read.sweethome3d.home_file.home_xml import (
     HomePlan,
@@ -211,7 +211,7 @@ def _floor_items(
     rings = [_rings_of_polygon(p) for p in parts]
     surface = horizontal("floor", rings, room.level.elevation, material, up=True)
     surface = _textured(surface, room.plan.floor)
-    return [_item(room, ItemKind.FLOOR, FLOOR, surface)]
+    return [_item(room, ItemKind.FLOOR, surface)]
 
 
 def _ceiling(
@@ -226,18 +226,17 @@ def _ceiling(
         material,
         is_flat=room.plan.is_ceiling_flat,
     )
-    return [_item(room, ItemKind.CEILING, CEILING, _textured(surface, room.plan.ceiling))]
+    return [_item(room, ItemKind.CEILING, _textured(surface, room.plan.ceiling))]
 
 
-def _item(room: ReadRoom, kind: ItemKind, nyu40: int, surface: Surface) -> Item:
-    return Item(
-        id=f"{kind}_{room.id}",
-        name=f"{str(kind).capitalize()} of {room.plan.name or 'room ' + room.id}",
-        kind=kind,
+def _item(room: ReadRoom, kind: ItemKind, surface: Surface) -> Item:
+    return structure_item(
+        f"{kind}_{room.id}",
+        kind,
+        [surface],
+        name=f"{kind.capitalize()} of {room.plan.name or 'room ' + room.id}",
         level_id=room.level_id,
-        surfaces=(surface,),
-        nyu40=nyu40,
-        source_class=str(kind),
+        source_class=kind.value,
         room_id=room.id,
     )
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
@@ -14,17 +14,18 @@ from pbrs_farm.core.classes import LAMP
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import is_flattening
 from pbrs_farm.core.house import MAX_INSTANCES, ItemKind
-from pbrs_farm.core.mesh import unit_vectors
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.formats.glb import GlbWriter, Gltf
+from pbrs_farm.formats.glb import Gltf
 from pbrs_farm.formats.house_glb import V_DOWN
 from pbrs_farm.home.room_use import named_kind
 from pbrs_farm.read.common.name_classes import NodeClass, class_of_node_name
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.gltf.document import MAX_DEPTH, MAX_NODES, UNREAD
+from pbrs_farm.read.gltf.scene_writer import SceneWriter, matrix_row
+from pbrs_farm.read.mesh.shape import Shape
 from pbrs_farm.read.usd.joints import add_joints
 from pbrs_farm.read.usd.shaders import Shaders
-from pbrs_farm.read.usd.shapes import NOT_READ, Shape, light_shape, mesh_shape, solid_shape
+from pbrs_farm.read.usd.shapes import NOT_READ, light_shape, mesh_shape, solid_shape
 
 EXTRAS_ATTRIBUTE: Final = "pbrs:item"
 """Of a prim: JSON that our own exports say of an item, as extras of its node."""
@@ -57,14 +58,11 @@ class StageNodes:
         self._stage, self._file, self._notes, self._fields = stage, file, notes, fields
         self._shaders = shaders
         self._time = Usd.TimeCode.EarliestTime()
-        self._writer = GlbWriter()
-        self._meshes: list[_Row] = []
-        self._nodes: list[_Row] = []
-        self._lights: list[_Row] = []
+        self._scene = SceneWriter(file)
+        self._nodes = self._scene.nodes
         self._known: dict[Any, int | None] = {}
         self._unread: dict[str, int] = {}
         self._nodes_of: dict[str, list[int]] = {}  # path of a prim -> its nodes
-        self._n_triangles = 0
         self._holders = _holders(stage)
 
     def gltf(self, scene_extras: _Row) -> Gltf:
@@ -74,7 +72,7 @@ class StageNodes:
         if UsdGeom.GetStageUpAxis(self._stage) == UsdGeom.Tokens.z:
             # (x, y, z) with z up is (x, z, -y) with y up.
             world[:3, :3] = metres * np.array([[1.0, 0, 0], [0, 0, 1], [0, -1, 0]])
-        self._nodes.append({"name": "", "matrix": world.T.ravel().tolist(), "children": []})
+        self._nodes.append({"name": "", "matrix": matrix_row(world), "children": []})
         stack = [(p, _Above(0, 1, "")) for p in reversed(_children(self._stage.GetPseudoRoot()))]
         while stack:
             prim, above = stack.pop()
@@ -83,20 +81,9 @@ class StageNodes:
         for kind, n in self._unread.items():
             self._notes.add(UNREAD, kind, f"{n} prims are {kind}, which are not read")
         shaders = self._shaders
-        extensions = {"KHR_lights_punctual": {"lights": self._lights}} if self._lights else {}
-        document = {
-            "asset": {"version": "2.0"},
-            "scene": 0,
-            "scenes": [{"nodes": [0], "extras": scene_extras}],
-            "nodes": self._nodes,
-            "meshes": self._meshes,
-            "materials": shaders.materials,
-            "textures": shaders.textures,
-            "samplers": shaders.samplers,
-            "images": shaders.images,
-            "extensions": extensions,
-        }
-        return self._writer.gltf(document, self._file)
+        self._scene.materials += shaders.materials
+        pictures = {"textures": shaders.textures, "images": shaders.images}
+        return self._scene.gltf(0, scene_extras, samplers=shaders.samplers, **pictures)
 
     def _visit(self, prim: Any, above: _Above) -> Iterator[tuple[Any, _Above]]:
         """Add a prim's node; yields the children to visit."""
@@ -145,11 +132,10 @@ class StageNodes:
         )  # says what its lights are
         if prim.HasAPI(UsdLux.LightAPI) or prim.IsA(UsdLux.BoundableLightBase):
             self._light(prim, node, is_part=above.in_lamp)
-        self._nodes[above.node]["children"].append(len(self._nodes))
-        self._nodes_of.setdefault(str(prim.GetPath()), []).append(len(self._nodes))
-        self._nodes.append(node)
+        number = self._scene.add_node(node, above.node)
+        self._nodes_of.setdefault(str(prim.GetPath()), []).append(number)
         label = cls if cls and cls.is_tagged and cls.kind in _STRUCTURE else above.structure
-        return _Above(len(self._nodes) - 1, above.depth + 1, path, in_lamp, label)
+        return _Above(number, above.depth + 1, path, in_lamp, label)
 
     def _class(self, prim: Any, above: _Above, node: _Row) -> NodeClass | None:
         """The prim's class; written to the node's extras if the prim has it."""
@@ -245,36 +231,17 @@ class StageNodes:
             parts = [] if shape is None else list(self._parts(prim, shape, bound))
         if shape is None or not parts:
             return None
-        self._n_triangles += len(shape.faces)
-        if len(shape.faces) > self._fields.max_model_triangles:
-            text = f"more than {self._fields.max_model_triangles} triangles"
-            hint = "limit: read.max_model_triangles"
-            raise BadHouse(self._file, str(prim.GetPath()), text, hint=hint)
-        if self._n_triangles > self._fields.max_triangles:
-            text = f"more than {self._fields.max_triangles} triangles"
-            raise BadHouse(self._file, str(prim.GetPath()), text, hint="limit: read.max_triangles")
-        add = self._writer.add_vertices
-        attributes = {"POSITION": add(shape.positions.astype(np.float32), with_bounds=True)}
-        if shape.normals is not None:
-            attributes["NORMAL"] = add(unit_vectors(shape.normals).astype(np.float32))
         if shape.uvs is not None:
             down = shape.uvs.astype(np.float32) * V_DOWN + np.array([0, 1], np.float32)
-            attributes["TEXCOORD_0"] = add(down)
-        primitives = []
-        for faces, number in parts:
-            row: _Row = {
-                "attributes": attributes,
-                "indices": self._writer.add_faces(faces.astype(np.int32)),
-            }
-            primitives.append(row | ({} if number is None else {"material": number}))
-        self._meshes.append({"name": prim.GetName()[:100], "primitives": primitives})
-        return len(self._meshes) - 1
+            shape = replace(shape, uvs=down)
+        place, name = str(prim.GetPath()), prim.GetName()[:100]
+        return self._scene.add_mesh(shape, parts, place, self._fields, name=name)
 
     def _parts(self, prim: Any, shape: Shape, bound: Any) -> Iterator[tuple[I64, int | None]]:
         """(triangles, material) of each subset of a mesh's faces, and of the rest."""
         rest = np.ones(len(shape.faces), np.bool_)
         binding = UsdShade.MaterialBindingAPI(prim)
-        for subset in binding.GetMaterialBindSubsets() if prim.IsA(UsdGeom.Mesh) else ():
+        for subset in () if shape.polygon is None else binding.GetMaterialBindSubsets():
             chosen = np.asarray(subset.GetIndicesAttr().Get(self._time) or [], np.int64)
             is_own = np.isin(shape.polygon, chosen) & rest
             rest &= ~is_own
@@ -342,8 +309,7 @@ class StageNodes:
             row["extras"]["assumed"] = True
         else:
             row["intensity"] = float(flux / (2 * np.pi * (1 - np.cos(cutoff))))
-        node["extensions"] = {"KHR_lights_punctual": {"light": len(self._lights)}}
-        self._lights.append(row)
+        node |= self._scene.add_light(row)
 
     # Instances
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -10,11 +9,20 @@ from pxr import UsdGeom, UsdLux
 
 from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.house import Surface
-from pbrs_farm.geometry.solids import box, lathe, quads_surface, sphere
+from pbrs_farm.geometry.solids import box, quads_surface
+from pbrs_farm.read.mesh.shape import (
+    ABOUT_X,
+    ABOUT_Z,
+    ROUND,
+    Shape,
+    ball,
+    capsule_profile,
+    cylinder_profile,
+    shape_of_surface,
+    turned,
+)
 from pbrs_farm.read.mesh.triangulate import triangulated_corners
 
-_ROUND: Final = 24  # segments around a round shape
 _OFF_M: Final = 0.005  # offset of a flat light from its ceiling, metres
 # Other shape types, which are not triangulated.
 NOT_READ: Final = (
@@ -26,17 +34,6 @@ NOT_READ: Final = (
     "TetMesh",
     "Volume",
 )
-
-
-@dataclass(frozen=True, slots=True, eq=False)
-class Shape:
-    """Triangles in a prim's own frame and unit."""
-
-    positions: F64  # (V, 3)
-    faces: I64  # (F, 3)
-    polygon: I64  # (F,) number of the face of the prim that a triangle was cut from
-    uvs: F64 | None = None  # (V, 2), v up
-    normals: F64 | None = None  # (V, 3)
 
 
 def mesh_shape(prim: Any, time: Any, file: str, uv_name: str = "") -> Shape | None:
@@ -68,7 +65,7 @@ def mesh_shape(prim: Any, time: Any, file: str, uv_name: str = "") -> Shape | No
         faces, (uvs, normals) = indices[triangles], of_points
     if mesh.GetOrientationAttr().Get() == UsdGeom.Tokens.leftHanded:
         faces = faces[:, ::-1]
-    return Shape(points, np.ascontiguousarray(faces), polygon, uvs, normals)
+    return Shape(points, np.ascontiguousarray(faces), uvs, normals, polygon)
 
 
 def _check_mesh(points: F64, sizes: I64, indices: I64, file: str, place: str) -> None:
@@ -155,51 +152,25 @@ def solid_shape(prim: Any, time: Any) -> Shape | None:
         number = default if number is None else float(number)
         return number if np.isfinite(number) and abs(number) < 1e9 else default
 
-    kind, origin = prim.GetTypeName(), np.zeros(3)
-    r, h = value("radius", 1.0), value("height", 2.0)
+    kind = prim.GetTypeName()
+    r, half = value("radius", 1.0), value("height", 2.0) / 2
+    # A lathe turns about y, planes of USD lie across their axis.
+    axis = str(prim.GetAttribute("axis").Get() or "Z")
+    order = {"Z": ABOUT_Z, "X": ABOUT_X}.get(axis, (0, 1, 2))
     if kind == "Cube":
-        return _of_surface(box("", origin, np.full(3, value("size", 2.0) / 2), 0))
+        return shape_of_surface(box("", np.zeros(3), np.full(3, value("size", 2.0) / 2), 0))
     if kind == "Sphere":
-        return _of_surface(sphere("", origin, value("radius", 1.0), 0, n=_ROUND))
+        return ball(r)
     if kind == "Plane":
         w, d = value("width", 2.0) / 2, value("length", 2.0) / 2
-        # In the plane of lathes, y across it.
         quad = [[-w, 0, d], [w, 0, d], [w, 0, -d], [-w, 0, -d]]
-        return _turned_to_axis(quads_surface("", np.array([quad]), 0), prim)
+        return shape_of_surface(quads_surface("", np.array([quad]), 0), order)
     profiles: dict[str, Any] = {
-        "Cylinder": [[0, -h / 2], [r, -h / 2], [r, h / 2], [0, h / 2]],
-        "Cone": [[0, -h / 2], [r, -h / 2], [0, h / 2]],
-        "Capsule": _capsule(value("radius", 0.5), value("height", 1.0)),
+        "Cylinder": cylinder_profile(r, half),
+        "Cone": np.array([[0, -half], [r, -half], [0, half]], np.float64),
+        "Capsule": capsule_profile(value("radius", 0.5), value("height", 1.0) / 2),
     }
-    if kind not in profiles:
-        return None
-    return _turned_to_axis(
-        lathe("", np.array(profiles[kind], np.float64), origin, 0, n=_ROUND), prim
-    )
-
-
-def _capsule(r: float, h: float) -> F64:
-    angles = np.linspace(-np.pi / 2, np.pi / 2, 13)
-    lift = np.where(angles < 0, -h / 2, h / 2)
-    return np.column_stack([r * np.cos(angles), r * np.sin(angles) + lift])
-
-
-def _turned_to_axis(surface: Surface, prim: Any) -> Shape:
-    """The shape turned about y, turned to the prim's axis."""
-    axis = str(prim.GetAttribute("axis").Get() or "Z")
-    order = {"Z": [2, 0, 1], "X": [1, 2, 0]}.get(axis, [0, 1, 2])
-    shape = _of_surface(surface)
-    normals = None if shape.normals is None else shape.normals[:, order]
-    return Shape(shape.positions[:, order], shape.faces, shape.polygon, shape.uvs, normals)
-
-
-def _of_surface(surface: Surface) -> Shape:
-    normals = None if surface.normals is None else surface.normals.astype(np.float64)
-    uvs = None if surface.uvs is None else surface.uvs.astype(np.float64)
-    n = np.arange(len(surface.faces))
-    return Shape(
-        surface.positions.astype(np.float64), surface.faces.astype(np.int64), n, uvs, normals
-    )
+    return turned(profiles[kind], order) if kind in profiles else None
 
 
 def light_shape(prim: Any, time: Any) -> Shape | None:
@@ -210,17 +181,16 @@ def light_shape(prim: Any, time: Any) -> Shape | None:
         )
         ring = np.array([[-w, -h], [-w, h], [w, h], [w, -h]])
     elif prim.IsA(UsdLux.DiskLight):
-        angles = -2 * np.pi * np.arange(_ROUND) / _ROUND
+        angles = -2 * np.pi * np.arange(ROUND) / ROUND
         radius = float(prim.GetAttribute("inputs:radius").Get(time) or 0.5)
         ring = radius * np.column_stack([np.cos(angles), np.sin(angles)])
     elif prim.IsA(UsdLux.CylinderLight):
         r = float(prim.GetAttribute("inputs:radius").Get(time) or 0.5)
         h = float(prim.GetAttribute("inputs:length").Get(time) or 1.0) / 2
-        profile = np.array([[0, -h], [r, -h], [r, h], [0, h]], np.float64)
-        shape = _of_surface(lathe("", profile, np.zeros(3), 0, n=_ROUND))
-        return Shape(shape.positions[:, [1, 2, 0]], shape.faces, shape.polygon)
+        shape = turned(cylinder_profile(r, h), ABOUT_X)
+        return Shape(shape.positions, shape.faces)
     else:
         return None
     points = np.column_stack([ring, np.full(len(ring), -_OFF_M)])
     k = np.arange(1, len(ring) - 1)
-    return Shape(points, np.column_stack([np.zeros_like(k), k, k + 1]), np.arange(len(k)))
+    return Shape(points, np.column_stack([np.zeros_like(k), k, k + 1]))
