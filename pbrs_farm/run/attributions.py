@@ -15,7 +15,6 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.errors import ObjectMissing
 from pbrs_farm.core.house import House
 from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
-from pbrs_farm.dress.gates.bodies import piece_id
 from pbrs_farm.dress.report import Credit, DressReport, is_owed
 from pbrs_farm.store.object_store import Store, get_or_none
 
@@ -72,6 +71,8 @@ def licences_of_view(
     All pictures of an item count, on its hidden sides too. The home counts, by its file, if one of its
     items is visible. Generated items, and homes and models without a named licence, are not listed.
     """
+    from pbrs_farm.dress.gates.bodies import piece_id  # here: scipy, which other processes spare
+
     items = [house.items[int(row["id"]) - 1] for row in instances]
     shown = {piece_id(item) for item in items}
     materials = {s.material for item in items for s in item.surfaces}

@@ -37,10 +37,9 @@ _OF_LIGHT = (
     "pbrs_farm.transport.lampshade_exitance",
     "pbrs_farm.transport.pilot",
     "pbrs_farm.transport.sample_passes",
+    "pbrs_farm.transport.view_emitters",
     "pbrs_farm.transport.kernels.outside",
     "pbrs_farm.run.house_cache",
-    "pbrs_farm.run.chosen_cameras",
-    "pbrs_farm.run.chosen_cameras",
 )
 _OF_FINISHING = (
     "pbrs_farm.run.steps",

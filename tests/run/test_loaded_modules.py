@@ -1,4 +1,4 @@
-"""Modules that a light process loads before its first task."""
+"""Modules that the processes of a run load."""
 
 import subprocess
 import sys
@@ -44,3 +44,12 @@ def test_light_waits_for_no_module_of_ours(tmp_path: Path) -> None:
         return subprocess.run(command, capture_output=True, text=True, check=True).stdout.strip()
 
     assert output_of(_LIGHT, output_of(_HOUSE)) == ""
+
+
+def test_the_process_that_supervises_a_run_loads_no_scipy() -> None:
+    code = (
+        "import sys, pbrs_farm.run.local; print('scipy' in sys.modules, 'shapely' in sys.modules)"
+    )
+    command = [sys.executable, "-c", code]
+    output = subprocess.run(command, capture_output=True, text=True, check=True).stdout
+    assert output.split() == ["False", "False"]

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import atexit
 import contextlib
+import gc
 import os
 import pkgutil
 import signal
@@ -37,6 +38,8 @@ def main(target: str) -> int:
     def send(message: Message) -> None:
         replies.write(message.line())
 
+    # Loaded modules are never garbage: keep the collector off while they load and from them afterwards.
+    gc.disable()
     try:
         # One handler for all tasks holds the state between them.
         handle = pkgutil.resolve_name(target)(send)
@@ -44,6 +47,8 @@ def main(target: str) -> int:
         traceback.print_exc()
         send(Message("fault", f"{type(error).__name__}: {error}"))
         return 1
+    gc.freeze()
+    gc.enable()
     send(Message("ready"))
     for line in requests:  # until the parent closes the pipe
         send(handle(line))
