@@ -10,8 +10,8 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.furnishings.surroundings.facades import COLUMNS, N_ROOMS, ROWS, Facade
 from pbrs_farm.furnishings.surroundings.scenery import (
     Rgb,
-    Scenery,
     SceneryMaterial,
+    Site,
     grass,
     lit,
     mottled,
@@ -36,6 +36,16 @@ class Front(NamedTuple):
     foot: F64  # (3,)
     along: F64  # (3,) unit
     to_home: F64  # (3,) unit
+    site: Site
+
+    @property
+    def rng(self) -> np.random.Generator:
+        """The source of its draws."""
+        return self.site.rng
+
+    def add(self, look: SceneryMaterial, quads: F64, uvs: F64 | None = None) -> None:
+        """Add quads in the world, as `Scenery.add` does."""
+        self.site.add(look, quads, uvs)
 
     def at(self, s: F64 | float, y: F64 | float, out: F64 | float = 0.0) -> F64:
         """World places s along, y up, out towards the home."""
@@ -43,22 +53,17 @@ class Front(NamedTuple):
         return np.asarray(self.foot + s[..., None] * self.along + y[...,
             None] * np.array([0.0, 1.0, 0.0]) + out[..., None] * self.to_home)
 
+    def rectangles(self, s0: F64, y0: F64, s1: F64, y1: F64, out: F64 | float) -> F64:
+        """Upright rectangles (N, 4, 3) between two places along and two heights."""
+        corners = [self.at(s, y, out) for s, y in ((s0, y0), (s1, y0), (s1, y1), (s0, y1))]
+        return np.stack(corners, -2).reshape(-1, 4, 3)
 
-def _rectangles(front: Front, s0: F64, y0: F64, s1: F64, y1: F64, out: F64 | float) -> F64:
-    corners = [front.at(s, y, out) for s, y in ((s0, y0), (s1, y0), (s1, y1), (s0, y1))]
-    return np.stack(corners, -2).reshape(-1, 4, 3)
-
-
-def _front_box(scenery: Scenery, thing: str, look: SceneryMaterial, front: Front, s0: float,
-    s1: float, y0: float, y1: float, out0: float, out1: float) -> None:
-    low, high = np.array([s0, y0, out0]), np.array([s1, y1, out1])
-    corners = np.array([[low[0], low[1], high[2]], [high[0], low[1], high[2]],
-        [high[0], high[1], high[2]], [low[0], high[1], high[2]], [low[0], low[1], low[2]],
-        [high[0], low[1], low[2]], [high[0], high[1], low[2]], [low[0], high[1], low[2]]])
-    world = front.at(corners[:, 0], corners[:, 1], corners[:, 2])
-    scenery.add(
-        thing, look, world[[[0, 1, 2, 3], [3, 2, 6, 7], [4, 0, 3, 7], [1, 5, 6, 2], [4, 5, 1, 0]]]
-    )
+    def box(self, look: SceneryMaterial, s0: float, s1: float, y0: float, y1: float, out0: float,
+        out1: float) -> None:
+        """Add a box without a back."""
+        s, y = np.tile([s0, s1, s1, s0], 2), np.tile([y0, y0, y1, y1], 2)
+        world = self.at(s, y, np.repeat([out1, out0], 4))
+        self.add(look, world[[[0, 1, 2, 3], [3, 2, 6, 7], [4, 0, 3, 7], [1, 5, 6, 2], [4, 5, 1, 0]]])
 
 
 class _Holes(NamedTuple):
@@ -71,51 +76,46 @@ class _Holes(NamedTuple):
     has_balcony: Any  # (N,) bool
 
 
-def block(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, facade: Facade,
-    rooms: SceneryMaterial, n_bays: int, n_storeys: int, *, depth_m: float = 10.0,
-    is_lit: float = 0.3, has_balconies: bool = False) -> None:
+def block(front: Front, facade: Facade, rooms: SceneryMaterial, n_bays: int, n_storeys: int, *,
+    depth_m: float = 10.0, is_lit: float = 0.3, has_balconies: bool = False) -> None:
     """A building of several storeys: a front with windows, sides, a roof and what sticks out.
 
     rooms: the look of `lit_rooms`, for windows of lit rooms.
     """
     width = n_bays * facade.bay_m
     top = _PLINTH_M + n_storeys * STOREY_M
-    _body(scenery, thing, front, facade, width, top, depth_m)
+    _body(front, facade, width, top, depth_m)
     share = facade.style.balconies if has_balconies else 0.0
-    holes = _front(scenery, thing, rng, front, facade, n_bays, n_storeys, share)
-    _lit_windows(scenery, thing, rng, front, holes, rooms, is_lit)
+    holes = _front(front, facade, n_bays, n_storeys, share)
+    _lit_windows(front, holes, rooms, is_lit)
     cornice = facade.style.cornice_m
-    _front_box(
-        scenery, thing, facade.trim, front, -0.1, width + 0.1, top - 0.1, top + 0.22, -0.1, cornice
-    )
-    _front_box(scenery, thing, facade.trim, front, -0.05, width + 0.05, top - 0.32, top - 0.1, -0.1,
-        0.45 * cornice)
+    front.box(facade.trim, -0.1, width + 0.1, top - 0.1, top + 0.22, -0.1, cornice)
+    front.box(facade.trim, -0.05, width + 0.05, top - 0.32, top - 0.1, -0.1, 0.45 * cornice)
     if facade.style.surround_m:
         y = _PLINTH_M + STOREY_M
-        _front_box(scenery, thing, facade.trim, front, 0, width, y - 0.1, y + 0.08, -0.05, 0.09)
-    _front_box(scenery, thing, _IRON, front, 0.12, 0.22, 0, top, 0.02, 0.12)
+        front.box(facade.trim, 0, width, y - 0.1, y + 0.08, -0.05, 0.09)
+    front.box(_IRON, 0.12, 0.22, 0, top, 0.02, 0.12)
     if facade.style.is_flat:
-        _flat_roof(scenery, thing, front, facade, width, top, depth_m)
+        _flat_roof(front, facade, width, top, depth_m)
     else:
-        _roof(scenery, thing, rng, front, facade, width, top, depth_m)
+        _roof(front, facade, width, top, depth_m)
     for k in np.flatnonzero(holes.has_balcony):
-        _balcony(scenery, thing, front, facade, holes.left[k] - 0.35, holes.right[k] + 0.35,
-            holes.low[k] - 0.1)
+        _balcony(front, facade, holes.left[k] - 0.35, holes.right[k] + 0.35, holes.low[k] - 0.1)
 
 
-def house(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, facade: Facade,
-    rooms: SceneryMaterial, *, is_lit: float = 0.3) -> None:
+def house(front: Front, facade: Facade, rooms: SceneryMaterial, *, is_lit: float = 0.3) -> None:
     """A house of one or two storeys with a gable."""
+    rng = front.rng
     n_bays, n_storeys = int(rng.integers(3, 5)), int(rng.integers(1, 3))
     width, depth = n_bays * facade.bay_m, float(rng.uniform(7, 10))
     top = _PLINTH_M + n_storeys * STOREY_M
     ridge = top + rng.uniform(0.32, 0.48) * width if rng.random() < 0.5 else 0.0
-    _body(scenery, thing, front, facade, width, top, depth)
-    holes = _front(scenery, thing, rng, front, facade, n_bays, n_storeys, 0.0)
-    _lit_windows(scenery, thing, rng, front, holes, rooms, is_lit)
-    _front_box(scenery, thing, _IRON, front, width - 0.22, width - 0.12, 0, top, 0.02, 0.12)
+    _body(front, facade, width, top, depth)
+    holes = _front(front, facade, n_bays, n_storeys, 0.0)
+    _lit_windows(front, holes, rooms, is_lit)
+    front.box(_IRON, width - 0.22, width - 0.12, 0, top, 0.02, 0.12)
     if not ridge:
-        _roof(scenery, thing, rng, front, facade, width, top, depth)
+        _roof(front, facade, width, top, depth)
         return
     # The gable looks at the home, under slopes that reach over it.
     middle = width / 2
@@ -123,42 +123,39 @@ def house(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, 
         [front.at(0, top), front.at(width, top), front.at(middle, ridge), front.at(middle, ridge)]
     )
     uvs = np.array([[0, top], [width, top], [middle, ridge], [middle, ridge]])
-    scenery.add(thing, facade.wall, gable[None], (uvs / facade.wall.size_m)[None])
+    front.add(facade.wall, gable[None], (uvs / facade.wall.size_m)[None])
     for s in (-_EAVES_M, width + _EAVES_M):
         eave = top - (ridge - top) * _EAVES_M / middle
         a, b = front.at(s, eave, _EAVES_M), front.at(middle, ridge + 0.05, _EAVES_M)
         c, d = front.at(middle, ridge + 0.05, -depth), front.at(s, eave, -depth)
-        _slope(scenery, thing, facade, d, a, b, c)
+        _slope(front, facade, d, a, b, c)
         low = np.stack([a, b, b - [0, 0.2, 0], a - [0, 0.2, 0]])
-        scenery.add(thing, facade.trim, low[None])
+        front.add(facade.trim, low[None])
 
 
-def _body(
-    scenery: Scenery, thing: str, front: Front, facade: Facade, width: float, top: float, depth: float
-) -> None:
+def _body(front: Front, facade: Facade, width: float, top: float, depth: float) -> None:
     """Sides without windows, and a plinth."""
     stone = SceneryMaterial("stone", rgb=(0.46, 0.45, 0.43))
-    _front_box(scenery, thing, stone, front, 0, width, -0.5, _PLINTH_M, -0.1, 0.05)
+    front.box(stone, 0, width, -0.5, _PLINTH_M, -0.1, 0.05)
     for s in (0.0, width):
         side = np.stack(
             [front.at(s, y, o) for y, o in ((-0.5, 0), (-0.5, -depth), (top, -depth), (top, 0))]
         )
         uvs = np.array([[0, -0.5], [depth, -0.5], [depth, top], [0, top]]) / facade.wall.size_m
-        scenery.add(thing, facade.wall, side[None], uvs[None])
+        front.add(facade.wall, side[None], uvs[None])
 
 
-def _front(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, facade: Facade,
-    n_bays: int, n_storeys: int, balconies: float) -> _Holes:
+def _front(front: Front, facade: Facade, n_bays: int, n_storeys: int, balconies: float) -> _Holes:
     """The wall of a front, with windows that lie in it, and a door; the windows are returned."""
     x0, y0, x1, y1 = facade.window
     bay, storey = np.indices((n_bays, n_storeys), np.float64).reshape(2, -1)
     n = len(bay)
     left, right = bay * facade.bay_m + x0, bay * facade.bay_m + x1
     floor = _PLINTH_M + storey * STOREY_M
-    has_balcony = (storey > 0) & (rng.random(n) < balconies)
+    has_balcony = (storey > 0) & (front.rng.random(n) < balconies)
     # Windows of a balcony are doors, so they begin at its floor.
     low, high = floor + np.where(has_balcony, 0.1, y0), floor + y1
-    is_door = (storey == 0) & (bay == int(rng.integers(0, n_bays)))
+    is_door = (storey == 0) & (bay == int(front.rng.integers(0, n_bays)))
     middle = (left + right) / 2
     left, right = (
         np.where(is_door, middle - _DOOR_M[0] / 2, left),
@@ -171,91 +168,79 @@ def _front(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front,
     at_sill = np.maximum(low, bottom)
     for s0, t0, s1, t1 in ((a, bottom, left, top), (right, bottom, b, top),
         (left, bottom, right, at_sill), (left, high, right, top)):
-        _add_wall(scenery, thing, facade.wall, front, s0, t0, s1, t1)
+        _add_wall(front, facade.wall, s0, t0, s1, t1)
     # reveals and their contents
     inner = facade.trim if facade.style.surround_m else facade.wall
     for p, q, r, t in ((left, low, left, high), (right, high, right, low),
         (left, high, right, high), (right, low, left, low)):
         reveal = np.stack([front.at(p, q), front.at(r, t), front.at(r, t, -_REVEAL_M),
             front.at(p, q, -_REVEAL_M)], -2)
-        scenery.add(thing, inner, reveal)
+        front.add(inner, reveal)
     is_glass = ~is_door
-    cells = rng.integers(0, COLUMNS * ROWS, n)
+    cells = front.rng.integers(0, COLUMNS * ROWS, n)
     corner = np.stack([cells % COLUMNS / COLUMNS, cells // COLUMNS / ROWS], -1)
     unit = np.array([[0, 0], [1, 0], [1, 1], [0, 1]])
     uvs = corner[:, None] + unit * [1 / COLUMNS, 1 / ROWS]
-    panes = _rectangles(front, left, low, right, high, -_REVEAL_M)
-    scenery.add(thing, facade.windows, panes[is_glass], uvs[is_glass])
+    panes = front.rectangles(left, low, right, high, -_REVEAL_M)
+    front.add(facade.windows, panes[is_glass], uvs[is_glass])
     if is_door.any():
-        scenery.add(thing, facade.door, panes[is_door], unit[None].astype(np.float64))
-    _about_windows(
-        scenery, thing, front, facade, left[is_glass], low[is_glass], right[is_glass], high[is_glass]
-    )
+        front.add(facade.door, panes[is_door], unit[None].astype(np.float64))
+    _about_windows(front, facade, left[is_glass], low[is_glass], right[is_glass], high[is_glass])
     corners = left, low, right, high, has_balcony
     return _Holes(*(v[is_glass] for v in corners))
 
 
-def _add_wall(scenery: Scenery, thing: str, look: SceneryMaterial, front: Front, s0: F64, y0: F64,
-    s1: F64, y1: F64) -> None:
+def _add_wall(front: Front, look: SceneryMaterial, s0: F64, y0: F64, s1: F64, y1: F64) -> None:
     """Rectangles of a front, its picture in metres on it."""
     corners = [
         np.stack(np.broadcast_arrays(s, y), -1) for s, y in ((s0, y0), (s1, y0), (s1, y1), (s0, y1))
     ]
-    scenery.add(
-        thing, look, _rectangles(front, s0, y0, s1, y1, 0.0), np.stack(corners, -2) / look.size_m
-    )
+    front.add(look, front.rectangles(s0, y0, s1, y1, 0.0), np.stack(corners, -2) / look.size_m)
 
 
-def _about_windows(scenery: Scenery, thing: str, front: Front, facade: Facade, left: F64, low: F64,
+def _about_windows(front: Front, facade: Facade, left: F64, low: F64,
     right: F64, high: F64) -> None:
     """Sills, bands about windows or lintels over them, and shutters."""
     over = np.stack([front.at(left - 0.08, low), front.at(right + 0.08, low),
         front.at(right + 0.08, low, 0.1), front.at(left - 0.08, low, 0.1)], -2)
-    lip = _rectangles(front, left - 0.08, low - 0.07, right + 0.08, low, 0.1)
-    scenery.add(thing, facade.trim, np.concatenate([over, lip]))
+    lip = front.rectangles(left - 0.08, low - 0.07, right + 0.08, low, 0.1)
+    front.add(facade.trim, np.concatenate([over, lip]))
     band = facade.style.surround_m
     if band:
         for s0, t0, s1, t1 in ((left - band, low, left, high + band),
             (right, low, right + band, high + band), (left, high, right, high + band)):
-            scenery.add(thing, facade.trim, _rectangles(front, s0, t0, s1, t1, 0.025))
+            front.add(facade.trim, front.rectangles(s0, t0, s1, t1, 0.025))
     elif facade.style.wall == "brick":
-        scenery.add(
-            thing, facade.trim, _rectangles(front, left - 0.12, high, right + 0.12, high + 0.2, 0.015)
-        )
+        front.add(facade.trim, front.rectangles(left - 0.12, high, right + 0.12, high + 0.2, 0.015))
     if facade.shutter is not None:
         half = (right - left) / 2
         for s0, s1 in ((left - band - half, left - band), (right + band, right + band + half)):
-            scenery.add(thing, facade.shutter, _rectangles(front, s0, low, s1, high, 0.05))
+            front.add(facade.shutter, front.rectangles(s0, low, s1, high, 0.05))
 
 
-def _balcony(
-    scenery: Scenery, thing: str, front: Front, facade: Facade, s0: float, s1: float, floor: float
-) -> None:
+def _balcony(front: Front, facade: Facade, s0: float, s1: float, floor: float) -> None:
     """A slab with a railing of bars, of a modern building with a parapet."""
     out = 1.15
-    _front_box(scenery, thing, facade.trim, front, s0, s1, floor - 0.16, floor, 0, out)
+    front.box(facade.trim, s0, s1, floor - 0.16, floor, 0, out)
     if facade.style.is_flat:
-        _front_box(scenery, thing, facade.wall, front, s0, s1, floor, floor + 0.95, out - 0.08, out)
+        front.box(facade.wall, s0, s1, floor, floor + 0.95, out - 0.08, out)
         return
     rods = np.arange(s0, s1, 0.12)
     n = len(rods)
-    scenery.add(thing, _IRON, _rectangles(front, rods - 0.009, np.full(n, floor), rods + 0.009,
+    front.add(_IRON, front.rectangles(rods - 0.009, np.full(n, floor), rods + 0.009,
         np.full(n, floor + 1.0), out - 0.03))
-    _front_box(
-        scenery, thing, _IRON, front, s0, s1, floor + 0.97, floor + 1.02, out - 0.05, out - 0.01
-    )
+    front.box(_IRON, s0, s1, floor + 0.97, floor + 1.02, out - 0.05, out - 0.01)
     for s in (s0, s1):
         depth = np.linspace(0.1, out - 0.03, 8)
         sides = np.stack([front.at(s, floor, depth - 0.009), front.at(s, floor, depth + 0.009),
             front.at(s, floor + 1.0, depth + 0.009), front.at(s, floor + 1.0, depth - 0.009)], -2)
-        scenery.add(thing, _IRON, sides)
+        front.add(_IRON, sides)
 
 
-def _lit_windows(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front,
-    holes: _Holes, rooms: SceneryMaterial, share: float) -> None:
+def _lit_windows(front: Front, holes: _Holes, rooms: SceneryMaterial, share: float) -> None:
     """Light behind a share of the windows, in both halves of their frames."""
-    on = np.flatnonzero(rng.random(len(holes.left)) < share)
-    room = rng.integers(0, N_ROOMS, len(on))
+    on = np.flatnonzero(front.rng.random(len(holes.left)) < share)
+    room = front.rng.integers(0, N_ROOMS, len(on))
     left, low, right, high = holes.left[on], holes.low[on], holes.right[on], holes.high[on]
     frame = 0.075 * (right - left)
     middle = (left + right) / 2
@@ -263,55 +248,50 @@ def _lit_windows(scenery: Scenery, thing: str, rng: np.random.Generator, front: 
     for half, (a, b) in enumerate(
         ((left + frame, middle - 0.5 * frame), (middle + 0.5 * frame, right - frame))
     ):
-        quads = _rectangles(front, a, low + frame, b, high - frame, 0.012 - _REVEAL_M)
+        quads = front.rectangles(a, low + frame, b, high - frame, 0.012 - _REVEAL_M)
         first = (room + 0.5 * half) / N_ROOMS
         uvs = np.stack([first, 0 * first], -1)[:, None] + unit * [0.5 / N_ROOMS, 1.0]
-        scenery.add(thing, rooms, quads, uvs)
+        front.add(rooms, quads, uvs)
 
 
-def _slope(scenery: Scenery, thing: str, facade: Facade, a: F64, b: F64, c: F64, d: F64) -> None:
+def _slope(front: Front, facade: Facade, a: F64, b: F64, c: F64, d: F64) -> None:
     """A slope of tiles, a to b along its eaves."""
     long_, up = float(np.linalg.norm(b - a)), float(np.linalg.norm(c - b))
     uvs = np.array([[0, 0], [long_, 0], [long_, up], [0, up]]) / facade.roof.size_m
-    scenery.add(thing, facade.roof, np.stack([a, b, c, d])[None], uvs[None])
+    front.add(facade.roof, np.stack([a, b, c, d])[None], uvs[None])
 
 
-def _flat_roof(
-    scenery: Scenery, thing: str, front: Front, facade: Facade, width: float, top: float, depth: float
-) -> None:
+def _flat_roof(front: Front, facade: Facade, width: float, top: float, depth: float) -> None:
     """A roof that is not seen from below, and a housing on it."""
-    scenery.add(thing, facade.trim, np.stack([front.at(s, top + 0.1, o) for s,
+    front.add(facade.trim, np.stack([front.at(s, top + 0.1, o) for s,
         o in ((0, 0), (width, 0), (width, -depth), (0, -depth))])[None])
-    _front_box(scenery, thing, facade.wall, front, 0.35 * width, 0.35 * width + 2.6, top, top + 2.2,
-        -5.5, -3.0)
+    front.box(facade.wall, 0.35 * width, 0.35 * width + 2.6, top, top + 2.2, -5.5, -3.0)
 
 
-def _roof(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, facade: Facade,
-    width: float, top: float, depth: float) -> None:
+def _roof(front: Front, facade: Facade, width: float, top: float, depth: float) -> None:
     """Two slopes over eaves with a gutter, and chimneys."""
-    ridge = top + rng.uniform(2.2, 3.6)
+    ridge = top + front.rng.uniform(2.2, 3.6)
     drop = _EAVES_M * (ridge - top) / (depth / 2)
     a, b = (front.at(s, top + 0.2 - drop, _EAVES_M) for s in (-0.2, width + 0.2))
     c, d = front.at(width + 0.2, ridge, -depth / 2), front.at(-0.2, ridge, -depth / 2)
     e, f = (front.at(s, top + 0.2 - drop, -depth - _EAVES_M) for s in (width + 0.2, -0.2))
-    _slope(scenery, thing, facade, a, b, c, d)
-    _slope(scenery, thing, facade, e, f, d, c)
+    _slope(front, facade, a, b, c, d)
+    _slope(front, facade, e, f, d, c)
     y = top + 0.2 - drop
-    _front_box(scenery, thing, _IRON, front, -0.2, width + 0.2, y - 0.09, y + 0.03, _EAVES_M - 0.02,
-        _EAVES_M + 0.1)
+    front.box(_IRON, -0.2, width + 0.2, y - 0.09, y + 0.03, _EAVES_M - 0.02, _EAVES_M + 0.1)
     for s in (0.0, width):
         gable = np.stack([front.at(s, top, 0), front.at(s, top, -depth),
             front.at(s, ridge, -depth / 2), front.at(s, ridge, -depth / 2)])
         uvs = np.array([[0, top], [depth, top], [depth / 2, ridge], [depth / 2, ridge]])
-        scenery.add(thing, facade.wall, gable[None], (uvs / facade.wall.size_m)[None])
-    for s in rng.uniform(0.15, 0.85, int(rng.integers(1, 3))) * width:
-        _front_box(scenery, thing, facade.wall, front, s, s + 0.7, ridge - 1.4, ridge + 0.9,
+        front.add(facade.wall, gable[None], (uvs / facade.wall.size_m)[None])
+    for s in front.rng.uniform(0.15, 0.85, int(front.rng.integers(1, 3))) * width:
+        front.box(facade.wall, s, s + 0.7, ridge - 1.4, ridge + 0.9,
             -depth / 2 - 0.3, -depth / 2 + 0.4)
 
 
-def car(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front) -> None:
+def car(front: Front) -> None:
     """A parked car, its flank to the home; foot is its left end on the road."""
-    paint = _PAINTS[int(rng.integers(0, len(_PAINTS)))]
+    paint = _PAINTS[int(front.rng.integers(0, len(_PAINTS)))]
     body = SceneryMaterial(
         f"paint {paint[0]:.2f}{paint[2]:.2f}",
         rgb=tuple(float(c**0.45) for c in paint),  # type: ignore[arg-type]
@@ -321,7 +301,7 @@ def car(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front) ->
         SceneryMaterial("car glass", rgb=(0.2, 0.23, 0.26), is_glossy=True),
         SceneryMaterial("tyre", rgb=(0.12, 0.12, 0.12)),
     )
-    scale = rng.uniform(0.94, 1.12)
+    scale = front.rng.uniform(0.94, 1.12)
     flank = (
         np.array([[0, 0.3], [0.05, 0.72], [0.75, 0.88], [3.9, 0.9], [4.2, 0.7], [4.2, 0.3]]) * scale
     )
@@ -331,54 +311,50 @@ def car(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front) ->
         for out in (near, far):
             points = front.at(outline[:, 0], outline[:, 1], out)
             for k in range(1, len(points) - 2, 2):
-                scenery.add(thing, look, points[[0, k, k + 1, k + 2]][None])
+                front.add(look, points[[0, k, k + 1, k + 2]][None])
             if len(points) % 2:
-                scenery.add(thing, look, points[[0, -2, -1, -1]][None])
+                front.add(look, points[[0, -2, -1, -1]][None])
         a, b = (
             front.at(outline[:, 0], outline[:, 1], near),
             front.at(outline[:, 0], outline[:, 1], far),
         )
-        scenery.add(thing, look, np.stack([a[:-1], a[1:], b[1:], b[:-1]], 1))
-    roof = front.at(cabin[1:3, 0], cabin[1:3, 1] + 0.01, np.array(-0.13))
-    back = front.at(cabin[1:3, 0], cabin[1:3, 1] + 0.01, np.array(-1.72 * scale + 0.13))
-    scenery.add(thing, body, np.stack([roof[0], roof[1], back[1], back[0]])[None])
+        front.add(look, np.stack([a[:-1], a[1:], b[1:], b[:-1]], 1))
+    roof = front.at(cabin[1:3, 0], cabin[1:3, 1] + 0.01, -0.13)
+    back = front.at(cabin[1:3, 0], cabin[1:3, 1] + 0.01, -1.72 * scale + 0.13)
+    front.add(body, np.stack([roof[0], roof[1], back[1], back[0]])[None])
     turn = np.linspace(0, np.pi, 5)
     for x in (0.8 * scale, 3.35 * scale):
         rim = np.stack([x + 0.33 * np.cos(turn), 0.33 + 0.33 * np.sin(turn)], 1)
         low = np.stack([rim[:, 0], 0.66 - rim[:, 1]], 1)
         ring_a, ring_b = front.at(rim[:, 0], rim[:, 1], 0.02), front.at(low[:, 0], low[:, 1], 0.02)
-        scenery.add(thing, tyre, np.stack([ring_a[:-1], ring_a[1:], ring_b[1:], ring_b[:-1]], 1))
+        front.add(tyre, np.stack([ring_a[:-1], ring_a[1:], ring_b[1:], ring_b[:-1]], 1))
 
 
-def lamp_post(scenery: Scenery, thing: str, front: Front) -> None:
+def lamp_post(front: Front) -> None:
     """A street lamp, which shines."""
-    _front_box(scenery, thing, _IRON, front, -0.05, 0.05, 0, 5.0, -0.05, 0.05)
-    _front_box(scenery, thing, _IRON, front, -0.04, 0.04, 4.9, 5.0, -1.2, 0.0)
-    _front_box(
-        scenery, thing, lit("lamp", (0.9, 0.82, 0.68)), front, -0.1, 0.1, 4.82, 4.9, -1.3, -0.8
-    )
+    front.box(_IRON, -0.05, 0.05, 0, 5.0, -0.05, 0.05)
+    front.box(_IRON, -0.04, 0.04, 4.9, 5.0, -1.2, 0.0)
+    front.box(lit("lamp", (0.9, 0.82, 0.68)), -0.1, 0.1, 4.82, 4.9, -1.3, -0.8)
 
 
-def fence(scenery: Scenery, thing: str, rng: np.random.Generator, front: Front, length: float,
-    height: float) -> None:
+def fence(front: Front, length: float, height: float) -> None:
     """A fence of boards along the front's line."""
-    wood = SceneryMaterial(
-        "fence boards", picture=mottled(rng, (0.10, 0.07, 0.045), (0.30, 0.22, 0.15))
-    )
+    wood = SceneryMaterial("fence boards", picture=mottled(front.rng, (0.10, 0.07, 0.045), (0.30,
+        0.22, 0.15)))
     s = np.arange(0, length, 0.14)
-    tall = height * rng.uniform(0.97, 1.0, len(s))
-    scenery.add(thing, wood, _rectangles(front, s, np.full(len(s), 0.05), s + 0.115, tall, 0.0))
+    tall = height * front.rng.uniform(0.97, 1.0, len(s))
+    front.add(wood, front.rectangles(s, np.full(len(s), 0.05), s + 0.115, tall, 0.0))
     for y in (0.25 * height, 0.75 * height):
-        _front_box(scenery, thing, wood, front, 0, length, y, y + 0.08, -0.06, -0.01)
+        front.box(wood, 0, length, y, y + 0.08, -0.06, -0.01)
 
 
-def railing(scenery: Scenery, thing: str, front: Front, length: float) -> None:
+def railing(front: Front, length: float) -> None:
     """A railing 1 m high along the front's line."""
     iron = SceneryMaterial("railing", rgb=(0.16, 0.16, 0.17))
     for y in (0.08, 0.98):
-        _front_box(scenery, thing, iron, front, 0, length, y, y + 0.035, 0, 0.03)
+        front.box(iron, 0, length, y, y + 0.035, 0, 0.03)
     s = np.linspace(0.01, length - 0.01, max(round(length / 0.11), 2))
-    scenery.add(thing, iron, _rectangles(front, s - 0.008, np.full(len(s), 0.1), s + 0.008,
+    front.add(iron, front.rectangles(s - 0.008, np.full(len(s), 0.1), s + 0.008,
         np.full(len(s), 0.98), 0.015))
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from pbrs_farm.core.arrays import F32, F64, Bools
 from pbrs_farm.dress.noise import noise
-from pbrs_farm.furnishings.surroundings.scenery import Rgb, Scenery, SceneryMaterial, mottled
+from pbrs_farm.furnishings.surroundings.scenery import Rgb, SceneryMaterial, Site, mottled
 from pbrs_farm.geometry.solids import box_quads
 
 _PX: Final = 128  # of the picture of a spray of leaves
@@ -167,22 +167,14 @@ def tree_line(rng: np.random.Generator) -> F32:
     return picture
 
 
-def tree(
-    scenery: Scenery,
-    thing: str,
-    rng: np.random.Generator,
-    foot: F64,
-    height: float,
-    leaves: Leaves,
-    *,
-    n: int = 340,
-) -> None:
+def tree(site: Site, foot: F64, height: float, leaves: Leaves, *, n: int = 340) -> None:
     """A tree on foot (3,): a trunk, branches, and n sprays of leaves about them, of a fir in a cone."""
+    rng = site.rng
     leaves, species = leaves.of_plant(rng), leaves.species
     crown_low = species.crown_from * height * rng.uniform(0.9, 1.1)
     radius = species.radius * rng.uniform(0.88, 1.12) * height
     if species.name == "fir":
-        _limb(scenery, thing, leaves.bark, foot, foot + _up(0.92 * height), 0.02 * height)
+        _limb(site, leaves.bark, foot, foot + _up(0.92 * height), 0.02 * height)
         share = rng.random(n) ** 1.7
         away = radius * (1 - share) * np.sqrt(rng.uniform(0.4, 1, n))
         turn = rng.uniform(0, 2 * np.pi, n)
@@ -190,16 +182,7 @@ def tree(
         places = np.stack([away * np.cos(turn), y, away * np.sin(turn)], 1)
         outward = np.stack([np.cos(turn), np.full(n, 0.7), np.sin(turn)], 1)
         depth = away / np.maximum(radius * (1 - share), 1e-6)
-        _add_sprays(
-            scenery,
-            thing,
-            rng,
-            leaves,
-            foot + places,
-            outward,
-            1.75 * height / np.sqrt(n),
-            depth > 0.72,
-        )
+        _add_sprays(site, leaves, foot + places, outward, 1.75 * height / np.sqrt(n), depth > 0.72)
         return
     # Limbs leave a bent trunk and fork; clumps of leaves sit at the ends of their twigs.
     middle = np.array([0, crown_low + 0.52 * (height - crown_low), 0])
@@ -208,9 +191,7 @@ def tree(
         [0, crown_low, 0.55 * height, 0.85 * height], [0, 1, 0]
     )
     for k, r in enumerate((0.024, 0.019, 0.012)):
-        _limb(
-            scenery, thing, leaves.bark, foot + trunk[k], foot + trunk[k + 1], r * height, end=0.75
-        )
+        _limb(site, leaves.bark, foot + trunk[k], foot + trunk[k + 1], r * height, end=0.75)
     n_limbs = int(rng.integers(6, 9))
     ends, starts = [], rng.uniform(0.05, 0.75, n_limbs)
     turns = 2 * np.pi * (np.arange(n_limbs) * 0.382 + rng.normal(0, 0.05, n_limbs))
@@ -220,10 +201,10 @@ def tree(
         reach = radius * rng.uniform(0.45, 0.62) * (1 - 0.45 * start)
         way = np.array([np.cos(turn), rng.uniform(0.35, 0.8), np.sin(turn)])
         elbow = root + reach * way
-        _limb(scenery, thing, leaves.bark, foot + root, foot + elbow, 0.009 * height, n=5)
+        _limb(site, leaves.bark, foot + root, foot + elbow, 0.009 * height, n=5)
         for _ in range(2):
             twig = elbow + 0.75 * reach * (way + 0.75 * _directions(rng, 1)[0]) * [1, 0.8, 1]
-            _limb(scenery, thing, leaves.bark, foot + elbow, foot + twig, 0.0045 * height, n=4)
+            _limb(site, leaves.bark, foot + elbow, foot + twig, 0.0045 * height, n=4)
             ends.append(twig)
         ends.append(elbow + _up(0.15 * reach))
     clumps = np.array([*ends, trunk[3]])
@@ -241,27 +222,22 @@ def tree(
     from_middle = (places - middle) / np.array([radius, 0.55 * (height - crown_low), radius])
     is_outer = np.linalg.norm(from_middle, axis=1) + 0.35 * from_middle[:, 1] > 0.62
     looks = outward + 0.6 * from_middle
-    _add_sprays(
-        scenery, thing, rng, leaves, foot + places, looks, 1.9 * height / np.sqrt(n), is_outer
-    )
+    _add_sprays(site, leaves, foot + places, looks, 1.9 * height / np.sqrt(n), is_outer)
 
 
-def bush(
-    scenery: Scenery, thing: str, rng: np.random.Generator, foot: F64, size: float, leaves: Leaves
-) -> None:
+def bush(site: Site, foot: F64, size: float, leaves: Leaves) -> None:
     """A bush with equal width and height."""
-    n, leaves = 130, leaves.of_plant(rng)
-    outward = _directions(rng, n)
+    n, leaves = 130, leaves.of_plant(site.rng)
+    outward = _directions(site.rng, n)
     outward[:, 1] = np.abs(outward[:, 1])
-    deep = rng.uniform(0.45, 1, n)
+    deep = site.rng.uniform(0.45, 1, n)
     places = outward * size * np.array([0.55, 0.85, 0.55]) * deep[:, None]
-    _add_sprays(scenery, thing, rng, leaves, foot + places, outward, 0.3 * size, deep > 0.72)
+    _add_sprays(site, leaves, foot + places, outward, 0.3 * size, deep > 0.72)
 
 
-def hedge(
-    scenery: Scenery, thing: str, rng: np.random.Generator, ends: F64, height: float, leaves: Leaves
-) -> None:
+def hedge(site: Site, ends: F64, height: float, leaves: Leaves) -> None:
     """A clipped hedge along the line ends (2, 3) on the ground."""
+    rng = site.rng
     along = ends[1] - ends[0]
     length, leaves = float(np.linalg.norm(along)), leaves.of_plant(rng)
     if length < 1.0:
@@ -271,9 +247,7 @@ def hedge(
     half = 0.35 * rng.uniform(0.8, 1.3)
     axes = np.stack([along, [0, 1, 0], across], 1)
     low, high = np.array([0, 0, -half + 0.1]), np.array([length, height - 0.12, half - 0.1])
-    scenery.add(
-        thing, leaves.solid, box_quads((low + high) / 2, (high - low) / 2) @ axes.T + ends[0]
-    )
+    site.add(leaves.solid, box_quads((low + high) / 2, (high - low) / 2) @ axes.T + ends[0])
     # Sprays on both sides and on top hide it.
     n = int(60 * length)
     s, v = rng.uniform(0, length, n), rng.uniform(-half, height + half, n)
@@ -283,12 +257,11 @@ def hedge(
     places = ends[0] + s[:, None] * along + off[:, None] * across
     places[:, 1] += y
     outward = np.where(over[:, None], [0.0, 1.0, 0.0], np.sign(off)[:, None] * across)
-    _add_sprays(scenery, thing, rng, leaves, places, outward, 0.22, rng.random(n) < 0.75)
+    _add_sprays(site, leaves, places, outward, 0.22, rng.random(n) < 0.75)
 
 
 def _limb(
-    scenery: Scenery,
-    thing: str,
+    site: Site,
     look: SceneryMaterial,
     start: F64,
     tip: F64,
@@ -309,7 +282,7 @@ def _limb(
     turn = np.linspace(0, 2 * np.pi, n + 1)[:, None]
     ring = np.cos(turn) * u + np.sin(turn) * v
     low, high = start + radius * ring, tip + end * radius * ring
-    scenery.add(thing, look, np.stack([low[:-1], low[1:], high[1:], high[:-1]], 1))
+    site.add(look, np.stack([low[:-1], low[1:], high[1:], high[:-1]], 1))
 
 
 def _up(y: float) -> F64:
@@ -322,25 +295,20 @@ def _directions(rng: np.random.Generator, n: int) -> F64:
 
 
 def _add_sprays(
-    scenery: Scenery,
-    thing: str,
-    rng: np.random.Generator,
-    leaves: Leaves,
-    places: F64,
-    outward: F64,
-    side: float,
-    is_outer: Bools,
+    site: Site, leaves: Leaves, places: F64, outward: F64, side: float, is_outer: Bools
 ) -> None:
     """Squares of about that side at places (N, 3), each looking outward and somewhere else."""
     n = len(places)
-    normal = outward / np.linalg.norm(outward, axis=1, keepdims=True) + 0.55 * _directions(rng, n)
+    normal = outward / np.linalg.norm(outward, axis=1, keepdims=True) + 0.55 * _directions(
+        site.rng, n
+    )
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    u = np.cross(normal, _directions(rng, n))
+    u = np.cross(normal, _directions(site.rng, n))
     u /= np.maximum(np.linalg.norm(u, axis=1, keepdims=True), 1e-9)
     v = np.cross(normal, u)
-    half = 0.5 * side * rng.uniform(0.75, 1.25, (n, 1))
+    half = 0.5 * side * site.rng.uniform(0.75, 1.25, (n, 1))
     a, b = u * half, v * half
     quads = np.stack([places - a - b, places + a - b, places + a + b, places - a + b], 1)
     uvs = np.broadcast_to(np.array([[0.0, 0], [1, 0], [1, 1], [0, 1]]), (n, 4, 2))
     for look, chosen in ((leaves.outer, is_outer), (leaves.inner, ~is_outer)):
-        scenery.add(thing, look, quads[chosen], uvs[chosen])
+        site.add(look, quads[chosen], uvs[chosen])

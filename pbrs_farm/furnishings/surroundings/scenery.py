@@ -155,6 +155,18 @@ class Scenery:
         return items, materials, textures
 
 
+class Site(NamedTuple):
+    """An item of the outdoors under construction, and the source of its draws."""
+
+    scenery: Scenery
+    item: str
+    rng: np.random.Generator
+
+    def add(self, look: SceneryMaterial, quads: F64, uvs: F64 | None = None) -> None:
+        """Add quads as `Scenery.add` does."""
+        self.scenery.add(self.item, look, quads, uvs)
+
+
 @cache
 def _bytes() -> NDArray[np.uint8]:
     """(_TABLE + 1,) sRGB-encoded bytes of linear 0..1."""

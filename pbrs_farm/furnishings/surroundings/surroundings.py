@@ -41,7 +41,14 @@ from pbrs_farm.furnishings.surroundings.plants import (
     tree,
     tree_line,
 )
-from pbrs_farm.furnishings.surroundings.scenery import Drawn, Scenery, SceneryMaterial, lit, mottled
+from pbrs_farm.furnishings.surroundings.scenery import (
+    Drawn,
+    Scenery,
+    SceneryMaterial,
+    Site,
+    lit,
+    mottled,
+)
 from pbrs_farm.home.room_use import RoomKind, named_kind
 
 # fmt: off
@@ -75,14 +82,11 @@ class _Side(NamedTuple):
     out: F64  # (3,) unit, away from the home
     along: F64  # (3,) unit
     half: float  # half its length
+    number: int
 
     def at(self, s: float, away: float, y: float = 0.0) -> F64:
         """The place s along and away from the side."""
         return np.asarray(self.middle + s * self.along + away * self.out + [0.0, y, 0.0])
-
-    def front(self, s: float, away: float) -> Front:
-        """Where a front that looks at the home begins."""
-        return Front(self.at(s, away), self.along, -self.out)
 
 
 class _Place(NamedTuple):
@@ -97,6 +101,14 @@ class _Place(NamedTuple):
     rooms: SceneryMaterial  # with lamps on, behind windows
     ground: dict[str, SceneryMaterial]
     eye_m: float  # of a person at the home's highest window, above the ground
+
+    def site(self, name: str, side: _Side) -> Site:
+        """An item of a side."""
+        return Site(self.scenery, f"{name}_{side.number}", self.rng)
+
+    def front(self, name: str, side: _Side, s: float, away: float) -> Front:
+        """The frame of an item that looks at the home, from s along and away from its side."""
+        return Front(side.at(s, away), side.along, -side.out, self.site(name, side))
 
 
 def with_surroundings(home: House, kind: str, seed: int) -> House:
@@ -123,8 +135,8 @@ def with_surroundings(home: House, kind: str, seed: int) -> House:
     sides = _sides(footprint, ground_y)
     kinds = _kinds(rng, kind, is_flat=n_below > 0)
     _lay_ground(place, footprint, sides, kinds, ground_y)
-    for number, (side, strip) in enumerate(zip(sides, kinds, strict=True)):
-        _STRIPS[strip](place, side, number)
+    for side, strip in zip(sides, kinds, strict=True):
+        _STRIPS[strip](place, side)
     _far_ring(place, footprint, ground_y, kinds)
     place.scenery.keep_off(footprint, LEAST_M)
     if n_below > 0:
@@ -168,7 +180,7 @@ def _sides(footprint: BaseGeometry, ground_y: float) -> list[_Side]:
     for ox, oz, half in ((0, 1, hx), (1, 0, hz), (0, -1, hx), (-1, 0, hz)):
         out = np.array([ox, 0.0, oz])
         middle = np.array([cx + ox * hx, ground_y, cz + oz * hz])
-        sides.append(_Side(middle, out, np.array([oz, 0.0, -ox], np.float64), half))
+        sides.append(_Side(middle, out, np.array([oz, 0.0, -ox], np.float64), half, len(sides)))
     return sides
 
 
@@ -231,92 +243,87 @@ def _lay_ground(
     place.scenery.lay("ground", place.ground["lawn"], free, y)
 
 
-def _street(place: _Place, side: _Side, number: int) -> None:
+def _street(place: _Place, side: _Side) -> None:
     """A road with parked cars and trees, and a row of buildings across it."""
-    rng, scenery = place.rng, place.scenery
+    rng = place.rng
     away = _ROAD[1] + _PAVEMENT_M + rng.uniform(1.0, 3.5)
-    _row_of_blocks(place, side, number, away, extent=side.half + away + 14.0, is_town=True)
+    _row_of_blocks(place, side, away, extent=side.half + away + 14.0, is_town=True)
     for s in np.arange(-side.half - 14, side.half + 14, 5.2):
         if rng.random() < 0.55:
             far = rng.random() < 0.6
             distance = _ROAD[1] - 0.25 if far else _ROAD[0] + 1.9
-            car(scenery, f"cars_{number}", rng, side.front(s + rng.uniform(0, 0.5), distance))
+            car(place.front("cars", side, s + rng.uniform(0, 0.5), distance))
     for k, s in enumerate(np.arange(-side.half - 12, side.half + 12, rng.uniform(8, 11))):
         if k % 2 == 0:
-            lamp_post(scenery, f"lamps_{number}", Front(side.at(s, _ROAD[1] + 0.6), side.along,
-                side.out * -1))
+            lamp_post(place.front("lamps", side, s, _ROAD[1] + 0.6))
         foot = side.at(s + 3.5, _ROAD[1] + 0.9)
-        tree(scenery, f"trees_{number}", rng, foot, rng.uniform(4.5, 7.5),
+        tree(place.site("trees", side), foot, rng.uniform(4.5, 7.5),
             place.leaves[place.street_tree])
 
 
-def _court(place: _Place, side: _Side, number: int) -> None:
+def _court(place: _Place, side: _Side) -> None:
     """A paved court with some green and the backs of buildings about it."""
-    rng, scenery = place.rng, place.scenery
+    rng = place.rng
     away = rng.uniform(11.0, 17.0)
-    _row_of_blocks(place, side, number, away, extent=side.half + away, is_town=True, balconies=True)
+    _row_of_blocks(place, side, away, extent=side.half + away, is_town=True, balconies=True)
     for _ in range(int(rng.integers(2, 5))):
         foot = side.at(rng.uniform(-1, 1) * (side.half + 5), rng.uniform(5.5, away - 2.5))
-        tree(scenery, f"trees_{number}", rng, foot, rng.uniform(4, 8),
+        tree(place.site("trees", side), foot, rng.uniform(4, 8),
             place.leaves[int(rng.choice(_TOWN_TREES))])
     for _ in range(9):
         foot = side.at(rng.uniform(-1, 1) * (side.half + 6), rng.uniform(4.2, away - 1.5))
-        bush(scenery, f"bushes_{number}", rng, foot, rng.uniform(0.6, 1.3),
+        bush(place.site("bushes", side), foot, rng.uniform(0.6, 1.3),
             place.leaves[int(rng.choice(_BUSHES))])
 
 
-def _blocks(place: _Place, side: _Side, number: int) -> None:
+def _blocks(place: _Place, side: _Side) -> None:
     """Lawn with trees, and blocks of flats across it."""
     rng = place.rng
     away = rng.uniform(20.0, 27.0)
-    _row_of_blocks(
-        place, side, number, away, extent=side.half + away, is_town=False, balconies=True
-    )
-    _trees(place, side, number, 8, (6.0, away - 3.0), side.half + 14)
+    _row_of_blocks(place, side, away, extent=side.half + away, is_town=False, balconies=True)
+    _trees(place, side, 8, (6.0, away - 3.0), side.half + 14)
 
 
-def _garden(place: _Place, side: _Side, number: int) -> None:
+def _garden(place: _Place, side: _Side) -> None:
     """Lawn with bushes and trees, a hedge or a fence, and the neighbours' houses behind."""
-    rng, scenery = place.rng, place.scenery
+    rng = place.rng
     depth = rng.uniform(7.5, 12.0)
     half = side.half + depth * 0.8
     ends = np.stack([side.at(-half, depth), side.at(half, depth)])
     if rng.random() < 0.55:
         leaves = place.leaves[int(rng.choice(_HEDGES))]
-        hedge(scenery, f"hedge_{number}", rng, ends, rng.uniform(1.3, 2.1), leaves)
+        hedge(place.site("hedge", side), ends, rng.uniform(1.3, 2.1), leaves)
     else:
-        front = Front(ends[0], side.along, -side.out)
-        fence(scenery, f"fence_{number}", rng, front, 2 * half, rng.uniform(1.2, 1.9))
+        fence(place.front("fence", side, -half, depth), 2 * half, rng.uniform(1.2, 1.9))
     for _ in range(10):
         foot = side.at(rng.uniform(-1, 1) * half, rng.uniform(4.2, depth - 0.8))
-        bush(scenery, f"bushes_{number}", rng, foot, rng.uniform(0.5, 1.4),
+        bush(place.site("bushes", side), foot, rng.uniform(0.5, 1.4),
             place.leaves[int(rng.choice(_BUSHES))])
-    _trees(place, side, number, 4, (5.0, depth + 6.0), half)
+    _trees(place, side, 4, (5.0, depth + 6.0), half)
     s = -half - 4.0
     while s < half:
         cottage = place.cottages[int(rng.integers(0, len(place.cottages)))]
         away = depth + rng.uniform(7.0, 13.0)
         if rng.random() < 0.75:
-            house(scenery, f"houses_{number}", rng, side.front(s, away), cottage, place.rooms)
+            house(place.front("houses", side, s, away), cottage, place.rooms)
         s += rng.uniform(15.0, 20.0)
-    _trees(place, side, number, 8, (depth + 5.0, depth + 22.0), half + 12)
+    _trees(place, side, 8, (depth + 5.0, depth + 22.0), half + 12)
 
 
-def _hills(place: _Place, side: _Side, number: int) -> None:
+def _hills(place: _Place, side: _Side) -> None:
     """A meadow with a fence and few trees; hills are seen beyond."""
     rng = place.rng
     away = rng.uniform(8.0, 14.0)
     half = side.half + away
-    fence(place.scenery, f"fence_{number}", rng, side.front(-half, away), 2 * half,
-        rng.uniform(0.9, 1.3))
-    _trees(place, side, number, 9, (away + 2.0, 34.0), half + 14)
+    fence(place.front("fence", side, -half, away), 2 * half, rng.uniform(0.9, 1.3))
+    _trees(place, side, 9, (away + 2.0, 34.0), half + 14)
 
 
-_STRIPS: Final[dict[str, Callable[[_Place, _Side, int], None]]] = {"street": _street,
+_STRIPS: Final[dict[str, Callable[[_Place, _Side], None]]] = {"street": _street,
     "court": _court, "blocks": _blocks, "garden": _garden, "hills": _hills}
 
 
-def _row_of_blocks(place: _Place, side: _Side, number: int, away: float, *, extent: float,
+def _row_of_blocks(place: _Place, side: _Side, away: float, *, extent: float,
     is_town: bool, balconies: bool = False) -> None:
     """Buildings in a row, the eye of the home no higher than most of their storeys."""
     rng = place.rng
@@ -331,21 +338,18 @@ def _row_of_blocks(place: _Place, side: _Side, number: int, away: float, *, exte
         n_storeys = int(np.clip(least + rng.integers(-1, 3), 2, 11))
         width = n_bays * facade.bay_m
         set_back = 0.0 if is_town else rng.uniform(0, 6)
-        block(place.scenery, f"buildings_{number}", rng, side.front(s, away + set_back), facade,
-            place.rooms, n_bays, n_storeys, depth_m=10.0,
-            has_balconies=balconies or rng.random() < 0.25)
+        block(place.front("buildings", side, s, away + set_back), facade, place.rooms, n_bays,
+            n_storeys, depth_m=10.0, has_balconies=balconies or rng.random() < 0.25)
         s += width + (0.0 if is_town else rng.uniform(3, 9))
 
 
-def _trees(
-    place: _Place, side: _Side, number: int, n: int, away: tuple[float, float], half: float
-) -> None:
+def _trees(place: _Place, side: _Side, n: int, away: tuple[float, float], half: float) -> None:
     rng = place.rng
     for _ in range(n):
         kind = int(rng.choice(_GARDEN_TREES, p=_SHARES))
         foot = side.at(rng.uniform(-1, 1) * half, rng.uniform(*away))
         leaves, n_sprays = place.leaves[kind], 360 if away[0] < 8.0 else 200
-        tree(place.scenery, f"trees_{number}", rng, foot, rng.uniform(4.5, 10.0), leaves, n=n_sprays)
+        tree(place.site("trees", side), foot, rng.uniform(4.5, 10.0), leaves, n=n_sprays)
 
 
 def _far_ring(place: _Place, footprint: BaseGeometry, ground_y: float, kinds: list[str]) -> None:
@@ -383,6 +387,7 @@ def _far_ring(place: _Place, footprint: BaseGeometry, ground_y: float, kinds: li
 def _railings(place: _Place, windows: list[Opening], rooms: tuple[Room, ...]) -> None:
     """A railing before each French window that leads out to nothing."""
     areas = [(r, shapely.Polygon(r.polygon)) for r in rooms]
+    site = Site(place.scenery, "railings", place.rng)
     for opening in windows:
         quad = np.asarray(opening.quad, np.float64)
         low, high = float(quad[:, 1].min()), float(quad[:, 1].max())
@@ -405,4 +410,4 @@ def _railings(place: _Place, windows: list[Opening], rooms: tuple[Room, ...]) ->
         half = float(np.abs((quad - middle) @ along).max())
         foot = middle - half * along + 0.24 * out
         foot[1] = low
-        railing(place.scenery, "railings", Front(foot, along, -out), 2 * half)
+        railing(Front(foot, along, -out, site), 2 * half)

@@ -17,9 +17,8 @@ from pbrs_farm.furnishings.surroundings.facades import (
     lit_rooms,
 )
 from pbrs_farm.furnishings.surroundings.plants import SPECIES, leaves_of, tree, tree_line
-from pbrs_farm.furnishings.surroundings.scenery import Scenery, SceneryMaterial, lit
+from pbrs_farm.furnishings.surroundings.scenery import Scenery, SceneryMaterial, Site, lit
 
-FRONT = Front(np.zeros(3), np.array([1.0, 0.0, 0.0]), np.array([0.0, 0.0, 1.0]))
 STYLES = [(TOWN, k) for k in range(len(TOWN))] + [(HOUSES, k) for k in range(len(HOUSES))]
 
 
@@ -27,10 +26,11 @@ def built(own: Facade, *, is_house: bool) -> dict[str, F64]:
     """Corners of a building at z = 0 by the last word of its materials' names."""
     scenery, rng = Scenery(), np.random.default_rng(3)
     rooms = lit("rooms", picture=lit_rooms(rng))
+    front = Front(np.zeros(3), np.eye(3)[0], np.eye(3)[2], Site(scenery, "one", rng))
     if is_house:
-        house(scenery, "one", rng, FRONT, own, rooms)
+        house(front, own, rooms)
     else:
-        block(scenery, "one", rng, FRONT, own, rooms, 4, 5, has_balconies=True)
+        block(front, own, rooms, 4, 5, has_balconies=True)
     items, materials, _textures = scenery.items("0", 0)
     (item,) = items
     corners_by_name: dict[str, list[F64]] = {}
@@ -78,7 +78,7 @@ def test_sprays_of_leaves_have_holes(number: int) -> None:
     assert leaves.outer.picture is not None
     assert 0.25 < share_left(np.asarray(leaves.outer.picture, np.float64)) < 0.8
     scenery = Scenery()
-    tree(scenery, "tree", np.random.default_rng(2), np.zeros(3), 7.0, leaves)
+    tree(Site(scenery, "tree", np.random.default_rng(2)), np.zeros(3), 7.0, leaves)
     items, materials, textures = scenery.items("0", 0)
     cut = [m for m in materials if m.alpha_cutout]
     plants = [leaves._replace(tint=k) for k in range(len(leaves.tints))]
