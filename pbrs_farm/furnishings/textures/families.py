@@ -11,6 +11,7 @@ import numpy as np
 from pbrs_farm.dress.noise import Shape2
 from pbrs_farm.dress.patterns import Pattern
 from pbrs_farm.dress.surface_maps import SurfaceMaps
+from pbrs_farm.furnishings.textures.canvas import Canvas
 from pbrs_farm.furnishings.textures.laid_tiles import (
     Glaze,
     Laying,
@@ -37,7 +38,6 @@ from pbrs_farm.furnishings.textures.plain_surfaces import (
     weave_maps,
 )
 from pbrs_farm.furnishings.textures.planks import (
-    BoardLayout,
     PlankLook,
     chevron,
     grain_maps,
@@ -54,7 +54,8 @@ from pbrs_farm.furnishings.textures.wallpaper import (
 
 _TEXEL_M: Final = 0.0015  # greatest texel: what a camera of 640 pixels resolves from a metre away
 _STEP_PX: Final = 128
-_COARSE = (512, 512)  # pixels of one repeat of the finer detail
+_COARSE = (512, 512)  # pixels of one repeat of these:
+_COARSE_ONES: Final = ("wallpaper", "weave", "twill", "leather")
 _FLOOR_M = (2.0, 2.0)
 # fmt: off
 _SIZE_M: Final = {
@@ -77,12 +78,15 @@ def pixels_of(size_m: tuple[float, float]) -> Shape2:
     return height, width
 
 
-_Painter = Callable[[np.random.Generator, Pattern], SurfaceMaps]
+_Painter = Callable[[Canvas, Pattern], SurfaceMaps]
 
 
 def maps_of(pattern: Pattern) -> SurfaceMaps:
     """The pattern's pixels; KeyError for an unknown family."""
-    return FAMILIES[pattern.family](np.random.default_rng(pattern.seed), pattern)
+    size = size_of(pattern)
+    shape = _COARSE if pattern.family in _COARSE_ONES else pixels_of(size)
+    canvas = Canvas(np.random.default_rng(pattern.seed), shape, size)
+    return FAMILIES[pattern.family](canvas, pattern)
 
 
 def size_of(pattern: Pattern) -> tuple[float, float]:
@@ -94,39 +98,30 @@ def size_of(pattern: Pattern) -> tuple[float, float]:
     return _SIZE_M[pattern.family]
 
 
-def _strip_parquet(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
-    layout = rows_of_planks(rng, pixels_of(size_of(p)), size_of(p), 28, 4)
-    return _planks(rng, p, layout, PlankLook(variation=0.05))
+def _strip_parquet(c: Canvas, p: Pattern) -> SurfaceMaps:
+    return plank_maps(c, p.wood, rows_of_planks(c, 28, 4), PlankLook(variation=0.05), p.darkness)
 
 
-def _board_floor(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+def _board_floor(c: Canvas, p: Pattern) -> SurfaceMaps:
     # Long boards: a wide repeat, a joint or two in each row.
-    layout = rows_of_planks(
-        rng, pixels_of(size_of(p)), size_of(p), int(rng.choice([12, 14, 17])), 1
-    )
+    layout = rows_of_planks(c, int(c.rng.choice([12, 14, 17])), 1)
     look = PlankLook(bevel_m=0.003, variation=0.04, roughness=0.42)
-    return _planks(rng, p, layout, look)
+    return plank_maps(c, p.wood, layout, look, p.darkness)
 
 
-def _laminate(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
-    layout = rows_of_planks(rng, pixels_of(size_of(p)), size_of(p), 10, 2)
-    return _planks(rng, p, layout, PlankLook(0.0006, 0.0, 0.03, 0.34, 0.5))
+def _laminate(c: Canvas, p: Pattern) -> SurfaceMaps:
+    look = PlankLook(0.0006, 0.0, 0.03, 0.34, 0.5)
+    return plank_maps(c, p.wood, rows_of_planks(c, 10, 2), look, p.darkness)
 
 
-def _herringbone(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
-    layout = herringbone(pixels_of(size_of(p)), size_of(p), int(rng.choice([5, 6, 7])), 2)
-    return _planks(rng, p, layout, PlankLook(variation=0.05))
+def _herringbone(c: Canvas, p: Pattern) -> SurfaceMaps:
+    layout = herringbone(c, int(c.rng.choice([5, 6, 7])), 2)
+    return plank_maps(c, p.wood, layout, PlankLook(variation=0.05), p.darkness)
 
 
-def _chevron(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
-    layout = chevron(pixels_of(size_of(p)), size_of(p), 4, int(rng.choice([14, 16])))
-    return _planks(rng, p, layout, PlankLook(variation=0.045))
-
-
-def _planks(
-    rng: np.random.Generator, p: Pattern, layout: BoardLayout, look: PlankLook
-) -> SurfaceMaps:
-    return plank_maps(rng, p.wood, layout, size_of(p), look, p.darkness)
+def _chevron(c: Canvas, p: Pattern) -> SurfaceMaps:
+    layout = chevron(c, 4, int(c.rng.choice([14, 16])))
+    return plank_maps(c, p.wood, layout, PlankLook(variation=0.045), p.darkness)
 
 
 # Rows and columns in one repeat of that size, shift of every other row, joint, bevel; pixels.
@@ -144,10 +139,10 @@ _TILES: dict[str, tuple[tuple[float, float], Laying, float]] = {
 }
 
 
-def _tile_floor(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
+def _tile_floor(c: Canvas, p: Pattern) -> SurfaceMaps:
     """Variant: `<laying>[-checker|-mixed|-stone]`; the last tint is the grout where there are more."""
     laid, kind = _laid(p)
-    size, laying, bevel = _TILES[laid]
+    _size, laying, bevel = _TILES[laid]
     grout = p.tints[-1] if len(p.tints) > 1 else (0.72, 0.71, 0.68)
     colours = p.tints[:-1] if len(p.tints) > 1 else p.tints
     if kind == "stone":
@@ -156,7 +151,7 @@ def _tile_floor(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
     else:
         mottle = 0.004 if min(colours[0]) > 0.8 else 0.012
         glaze = Glaze(colours, kind or "plain", mottle, 0.009, 0.14, 0.5, bevel, grout)
-    return tile_maps(rng, pixels_of(size), size, laying, glaze)
+    return tile_maps(c, laying, glaze)
 
 
 def _laid(p: Pattern) -> tuple[str, str]:
@@ -165,32 +160,26 @@ def _laid(p: Pattern) -> tuple[str, str]:
     return laid or "30", kind
 
 
-def _marble(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
-    size, laying = size_of(p), Laying(4, 4, 0.0, 0.002)
-    shape = pixels_of(size)
-    sheet = marble(rng, shape, p.tints[0], p.tints[-1])
-    body = cut_from(rng, sheet, tile_grid(shape, size, laying))
-    grout = p.tints[0]
-    return tile_maps(
-        rng, shape, size, laying, Glaze((), "plain", 0.004, 0.008, 0.1, 0.5, 0.001, grout), body
-    )
+def _marble(c: Canvas, p: Pattern) -> SurfaceMaps:
+    laying = Laying(4, 4, 0.0, 0.002)
+    body = cut_from(c.rng, marble(c, p.tints[0], p.tints[-1]), tile_grid(c, laying))
+    glaze = Glaze((), "plain", 0.004, 0.008, 0.1, 0.5, 0.001, p.tints[0])
+    return tile_maps(c, laying, glaze, body)
 
 
-def _terracotta(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
-    n = int(rng.choice([7, 8, 10]))
-    return terracotta_maps(
-        rng, pixels_of(size_of(p)), size_of(p), Laying(n, n, 0.0, 0.007), p.tints[0]
-    )
+def _terracotta(c: Canvas, p: Pattern) -> SurfaceMaps:
+    n = int(c.rng.choice([7, 8, 10]))
+    return terracotta_maps(c, Laying(n, n, 0.0, 0.007), p.tints[0])
 
 
-def _wallpaper(rng: np.random.Generator, p: Pattern) -> SurfaceMaps:
-    """Variant: a name of wallpaper.PATTERNS or PLAIN; tints: ground, print, accent."""
-    return wallpaper_maps(rng, _COARSE, p.variant, p.tints[0], p.tints[1], p.tints[2])
+def _printed_carpet(c: Canvas, p: Pattern) -> SurfaceMaps:
+    pattern = p.variant if p.variant in PATTERNS else PATTERNS[0]
+    return printed_carpet_maps(c, pattern, p.tints)
 
 
-def _woven_cloth(rng: np.random.Generator, p: Pattern, *, twill: bool) -> SurfaceMaps:
+def _woven_cloth(c: Canvas, p: Pattern, *, twill: bool) -> SurfaceMaps:
     second = p.tints[1] if len(p.tints) > 1 else None
-    return weave_maps(rng, _COARSE, size_of(p), p.tints[0], second=second, twill=twill)
+    return weave_maps(c, p.tints[0], second=second, twill=twill)
 
 
 FAMILIES: dict[str, _Painter] = {
@@ -202,46 +191,27 @@ FAMILIES: dict[str, _Painter] = {
     "tiles": _tile_floor,
     "marble": _marble,
     "terracotta": _terracotta,
-    "brick": lambda r, p: brick_maps(
-        r, pixels_of(size_of(p)), size_of(p), p.tints[0], painted=False
+    "brick": lambda c, p: brick_maps(c, p.tints[0], painted=False),
+    "painted brick": lambda c, p: brick_maps(c, p.tints[0], painted=True),
+    "paint": lambda c, p: paint_maps(c, p.tints[0]),
+    "plaster": lambda c, p: plaster_maps(c, p.tints[0]),
+    "smooth plaster": lambda c, p: plaster_maps(c, p.tints[0], depth=0.35),
+    "concrete": lambda c, p: concrete_maps(c, p.tints[0]),
+    "carpet": lambda c, p: carpet_maps(c, p.tints[0], loops=False),
+    "loop carpet": lambda c, p: carpet_maps(c, p.tints[0], loops=True),
+    # Variant: a name of wallpaper.PATTERNS or PLAIN.
+    "wallpaper": lambda c, p: wallpaper_maps(c, p.variant, p.tints),
+    "printed carpet": _printed_carpet,
+    "grain": lambda c, p: grain_maps(c, p.wood),
+    "weave": lambda c, p: _woven_cloth(c, p, twill=False),
+    "twill": lambda c, p: _woven_cloth(c, p, twill=True),
+    "leather": lambda c, p: leather_maps(c, p.tints[0]),
+    "upright boards": lambda c, p: board_maps(c, p.tints[0], upright=True),
+    "level boards": lambda c, p: board_maps(c, p.tints[0], upright=False),
+    "wall planks": lambda c, p: wall_plank_maps(
+        c, p.wood, p.darkness, upright=p.variant != "level"
     ),
-    "painted brick": lambda r, p: brick_maps(
-        r, pixels_of(size_of(p)), size_of(p), p.tints[0], painted=True
-    ),
-    "paint": lambda r, p: paint_maps(r, pixels_of(size_of(p)), size_of(p), p.tints[0]),
-    "plaster": lambda r, p: plaster_maps(r, pixels_of(size_of(p)), size_of(p), p.tints[0]),
-    "smooth plaster": lambda r, p: plaster_maps(
-        r, pixels_of(size_of(p)), size_of(p), p.tints[0], depth=0.35
-    ),
-    "concrete": lambda r, p: concrete_maps(r, pixels_of(size_of(p)), size_of(p), p.tints[0]),
-    "carpet": lambda r, p: carpet_maps(
-        r, pixels_of(size_of(p)), size_of(p), p.tints[0], loops=False
-    ),
-    "loop carpet": lambda r, p: carpet_maps(
-        r, pixels_of(size_of(p)), size_of(p), p.tints[0], loops=True
-    ),
-    "wallpaper": _wallpaper,
-    "printed carpet": lambda r, p: printed_carpet_maps(
-        r,
-        pixels_of(size_of(p)),
-        size_of(p),
-        p.variant if p.variant in PATTERNS else PATTERNS[0],
-        (p.tints[0], p.tints[1], p.tints[2]),
-    ),
-    "grain": lambda r, p: grain_maps(r, p.wood, size_of(p), pixels_of(size_of(p))[1]),
-    "weave": lambda r, p: _woven_cloth(r, p, twill=False),
-    "twill": lambda r, p: _woven_cloth(r, p, twill=True),
-    "leather": lambda r, p: leather_maps(r, _COARSE, size_of(p), p.tints[0]),
-    "upright boards": lambda r, p: board_maps(
-        r, pixels_of(size_of(p)), size_of(p), p.tints[0], upright=True
-    ),
-    "level boards": lambda r, p: board_maps(
-        r, pixels_of(size_of(p)), size_of(p), p.tints[0], upright=False
-    ),
-    "wall planks": lambda r, p: wall_plank_maps(
-        r, p.wood, pixels_of(size_of(p)), size_of(p), p.darkness, upright=p.variant != "level"
-    ),
-    "slats": lambda r, p: slat_maps(r, p.wood, pixels_of(size_of(p)), size_of(p), p.darkness),
-    "panels": lambda r, p: panel_maps(r, pixels_of(size_of(p)), size_of(p), p.tints[0]),
+    "slats": lambda c, p: slat_maps(c, p.wood, p.darkness),
+    "panels": lambda c, p: panel_maps(c, p.tints[0]),
 }
 """Painters by family; docs/dress.md shows them all."""

@@ -8,9 +8,10 @@ from typing import Final
 import numpy as np
 
 from pbrs_farm.core.arrays import F32
-from pbrs_farm.dress.noise import Shape2, noise, smoothstep
+from pbrs_farm.dress.noise import smoothstep
 from pbrs_farm.dress.style import Rgb, Wood
-from pbrs_farm.dress.surface_maps import SurfaceMaps, normals_from_height, surface_maps
+from pbrs_farm.dress.surface_maps import SurfaceMaps, normals_from_height
+from pbrs_farm.furnishings.textures.canvas import Canvas
 from pbrs_farm.furnishings.textures.planks import BoardLayout, PlankLook, plank_maps, rows_of_planks
 
 PANELS_M: Final = {
@@ -26,19 +27,12 @@ _RAIL_M, _CAP_M, _FOOT_M = 0.085, 0.055, 0.13  # of panels: between them, above,
 _BEVEL_M, _SUNK_M = 0.028, 0.007  # the moulding round a panel
 
 
-def board_maps(
-    rng: np.random.Generator,
-    shape: Shape2,
-    size_m: tuple[float, float],
-    tint: Rgb,
-    *,
-    upright: bool,
-) -> SurfaceMaps:
+def board_maps(c: Canvas, tint: Rgb, *, upright: bool) -> SurfaceMaps:
     """Painted boards with grooves between them: matchboard where upright, else like a ship's side."""
-    along = size_m[0] if upright else size_m[1]
-    n = int(rng.choice([9, 11, 13] if upright else [7, 8, 10]))
-    across = (np.arange(shape[1] if upright else shape[0]) + 0.5) * (
-        along / shape[1 if upright else 0]
+    along = c.size_m[0] if upright else c.size_m[1]
+    n = int(c.rng.choice([9, 11, 13] if upright else [7, 8, 10]))
+    across = (np.arange(c.shape[1] if upright else c.shape[0]) + 0.5) * (
+        along / c.shape[1 if upright else 0]
     )
     board = np.floor(across * n / along).astype(int)
     edge = np.minimum(across % (along / n), along / n - across % (along / n)).astype(np.float32)
@@ -48,44 +42,32 @@ def board_maps(
         groove = np.maximum(
             groove, 0.25 * smoothstep(0.02, 0.0, (across % (along / n)).astype(np.float32))
         )
-    light = 1.0 + np.clip(rng.normal(0, 0.008, n), -0.02, 0.02).astype(np.float32)[board]
-    groove, light = (np.broadcast_to(v if upright else v[:, None], shape) for v in (groove, light))
-    grain = noise(rng, shape, slope=1.2, stretch=(5.0, 1.0) if upright else (1.0, 5.0))
+    light = 1.0 + np.clip(c.rng.normal(0, 0.008, n), -0.02, 0.02).astype(np.float32)[board]
+    groove, light = (
+        np.broadcast_to(v if upright else v[:, None], c.shape) for v in (groove, light)
+    )
+    grain = c.noise(slope=1.2, stretch=(5.0, 1.0) if upright else (1.0, 5.0))
     tone = light * (1.0 - 0.42 * groove) + 0.006 * grain
     colour = np.array(tint, np.float32) * tone[..., None]
     height = np.asarray(-_GROOVE_DEEP_M * groove + 0.00004 * grain, np.float32)
-    return surface_maps(colour, 0.5, height, size_m, 0.3)
+    return c.maps(colour, 0.5, height, 0.3)
 
 
-def wall_plank_maps(
-    rng: np.random.Generator,
-    wood: Wood,
-    shape: Shape2,
-    size_m: tuple[float, float],
-    darkness: float,
-    *,
-    upright: bool,
-) -> SurfaceMaps:
-    """Planks of wood on a wall, each of another tone; upright or level. size_m, shape: square."""
-    layout = rows_of_planks(rng, shape, size_m, int(rng.choice([13, 15, 18])), 1)
+def wall_plank_maps(c: Canvas, wood: Wood, darkness: float, *, upright: bool) -> SurfaceMaps:
+    """Planks of wood on a wall, each of another tone; upright or level. c.c: a square."""
+    layout = rows_of_planks(c, int(c.rng.choice([13, 15, 18])), 1)
     look = PlankLook(joint_m=0.002, bevel_m=0.004, variation=0.07, roughness=0.55, gloss=0.3)
-    maps = plank_maps(rng, wood, layout, size_m, look, darkness)
+    maps = plank_maps(c, wood, layout, look, darkness)
     return _turned(maps) if upright else maps
 
 
-def slat_maps(
-    rng: np.random.Generator,
-    wood: Wood,
-    shape: Shape2,
-    size_m: tuple[float, float],
-    darkness: float,
-) -> SurfaceMaps:
-    """Upright slats of wood before black felt. size_m, shape: square."""
-    n = round(size_m[1] / (_LATH_M + _GAP_M))
-    layout = rows_of_planks(rng, shape, size_m, n, 1)
+def slat_maps(c: Canvas, wood: Wood, darkness: float) -> SurfaceMaps:
+    """Upright slats of wood before black felt. c.c: a square."""
+    n = round(c.size_m[1] / (_LATH_M + _GAP_M))
+    layout = rows_of_planks(c, n, 1)
     # A slat's side edges count, not its ends, which nobody sees.
-    side = _side_m(layout, size_m)
-    maps = plank_maps(rng, wood, layout, size_m, PlankLook(joint_m=0.0, variation=0.05), darkness)
+    side = _side_m(layout, c.size_m)
+    maps = plank_maps(c, wood, layout, PlankLook(joint_m=0.0, variation=0.05), darkness)
     is_gap = smoothstep(_GAP_M / 2 + 0.001, _GAP_M / 2 - 0.001, side)
     edge = smoothstep(_GAP_M / 2 + 0.004, _GAP_M / 2, side)
     felt = np.array((0.05, 0.05, 0.052), np.float32) * 255
@@ -96,25 +78,23 @@ def slat_maps(
             maps,
             colour=colour.astype(np.uint8),
             roughness=0.55,
-            normal=normals_from_height(-_LATH_DEEP_M * edge, size_m),
+            normal=normals_from_height(-_LATH_DEEP_M * edge, c.size_m),
         )
     )
 
 
-def panel_maps(
-    rng: np.random.Generator, shape: Shape2, size_m: tuple[float, float], tint: Rgb
-) -> SurfaceMaps:
+def panel_maps(c: Canvas, tint: Rgb) -> SurfaceMaps:
     """One painted panel in its frame under a cap, repeated side by side, the foot at v = 0."""
-    width, height = size_m
-    x = (np.arange(shape[1], dtype=np.float32) + 0.5) * np.float32(width / shape[1])
-    y = height - (np.arange(shape[0], dtype=np.float32) + 0.5) * np.float32(height / shape[0])
-    rail = _RAIL_M * float(rng.uniform(0.85, 1.15))
+    width, height = c.size_m
+    x = (np.arange(c.shape[1], dtype=np.float32) + 0.5) * np.float32(width / c.shape[1])
+    y = height - (np.arange(c.shape[0], dtype=np.float32) + 0.5) * np.float32(height / c.shape[0])
+    rail = _RAIL_M * float(c.rng.uniform(0.85, 1.15))
     # distance inside the panel's opening, negative on the frame
     across = np.minimum(x, width - x) - rail / 2
     up = np.minimum(y - _FOOT_M, height - _CAP_M - rail - y)
     inside = np.minimum(across[None], up[:, None])
     slope = smoothstep(0.0, _BEVEL_M, inside)
-    field = smoothstep(_BEVEL_M + 0.03, _BEVEL_M + 0.05, inside) * bool(rng.random() < 0.5)
+    field = smoothstep(_BEVEL_M + 0.03, _BEVEL_M + 0.05, inside) * bool(c.rng.random() < 0.5)
     line = smoothstep(0.0025, 0.0, np.abs(inside)) + 0.6 * smoothstep(
         0.0025, 0.0, np.abs(inside - _BEVEL_M)
     )
@@ -123,11 +103,11 @@ def panel_maps(
     cap = smoothstep(_CAP_M + 0.005, _CAP_M - 0.003, height - y)
     lip = np.asarray(0.5 * smoothstep(0.006, 0.0, np.abs(height - y - 0.022)), np.float32)
     relief = _SUNK_M * (field - slope) + (0.006 * cap - 0.002 * lip)[:, None]
-    grain = noise(rng, shape, slope=1.0)
+    grain = c.noise(slope=1.0)
     tone = 1.0 - 0.3 * np.clip(line, 0, 1) - 0.22 * below[:, None] - 0.1 * lip[:, None]
     tone = tone - 0.015 * slope + 0.004 * grain
     colour = np.array(tint, np.float32) * np.asarray(tone, np.float32)[..., None]
-    return surface_maps(colour, 0.45, np.asarray(relief, np.float32), size_m, 0.35)
+    return c.maps(colour, 0.45, np.asarray(relief, np.float32), 0.35)
 
 
 def _side_m(layout: BoardLayout, size_m: tuple[float, float]) -> F32:

@@ -5,85 +5,71 @@ from __future__ import annotations
 import numpy as np
 
 from pbrs_farm.core.arrays import F32
-from pbrs_farm.dress.noise import Shape2, blurred, noise, smoothstep
+from pbrs_farm.dress.noise import Shape2, blurred, smoothstep
 from pbrs_farm.dress.style import Rgb
-from pbrs_farm.dress.surface_maps import SurfaceMaps, surface_maps
+from pbrs_farm.dress.surface_maps import SurfaceMaps
+from pbrs_farm.furnishings.textures.canvas import Canvas
 
 
-def paint_maps(
-    rng: np.random.Generator, shape: Shape2, size_m: tuple[float, float], tint: Rgb
-) -> SurfaceMaps:
+def paint_maps(c: Canvas, tint: Rgb) -> SurfaceMaps:
     """Wall paint put on by a roller: one tint, faintly clouded, with the roller's stipple."""
-    clouds = noise(rng, shape, slope=3.0, band=(1.0, 30.0))
-    per_metre = shape[1] / size_m[0]
-    stipple = noise(rng, shape, slope=0.5, band=(size_m[0] * 50, min(size_m[0] * 220, per_metre)))
+    clouds = c.noise(slope=3.0, band=(1.0, 30.0))
+    per_metre = c.shape[1] / c.size_m[0]
+    stipple = c.noise(slope=0.5, band=(c.size_m[0] * 50, min(c.size_m[0] * 220, per_metre)))
     colour = np.array(tint, np.float32) * (1.0 + 0.005 * clouds + 0.006 * stipple)[..., None]
     height = np.asarray(0.00009 * stipple + 0.0003 * clouds, np.float32)
-    return surface_maps(colour, 0.85, height, size_m, 0.0)
+    return c.maps(colour, 0.85, height, 0.0)
 
 
-def plaster_maps(
-    rng: np.random.Generator,
-    shape: Shape2,
-    size_m: tuple[float, float],
-    tint: Rgb,
-    *,
-    depth: float = 1.0,
-) -> SurfaceMaps:
+def plaster_maps(c: Canvas, tint: Rgb, *, depth: float = 1.0) -> SurfaceMaps:
     """Plaster worked with a trowel: strokes that cross, hollows a little darker."""
-    clouds = noise(rng, shape, slope=2.6, band=(1.0, 60.0))
+    clouds = c.noise(slope=2.6, band=(1.0, 60.0))
     # Lay strokes of two directions over each other, each where the other is low.
-    a = noise(rng, shape, slope=1.8, stretch=(3.0, 1.0), band=(6.0, 300.0))
-    b = noise(rng, shape, slope=1.8, stretch=(1.0, 3.0), band=(6.0, 300.0))
+    a = c.noise(slope=1.8, stretch=(3.0, 1.0), band=(6.0, 300.0))
+    b = c.noise(slope=1.8, stretch=(1.0, 3.0), band=(6.0, 300.0))
     strokes = np.maximum(a, b)
-    grain = noise(rng, shape, slope=0.4)
+    grain = c.noise(slope=0.4)
     tone = 0.012 * clouds + 0.014 * (strokes - 0.56) + 0.008 * grain
     colour = np.array(tint, np.float32) * (1.0 + np.float32(depth) * tone)[..., None]
     height = depth * (0.00045 * strokes + 0.0006 * clouds + 0.00006 * grain)
-    return surface_maps(colour, 0.9, height, size_m, 0.0)
+    return c.maps(colour, 0.9, height, 0.0)
 
 
-def concrete_maps(
-    rng: np.random.Generator, shape: Shape2, size_m: tuple[float, float], tint: Rgb
-) -> SurfaceMaps:
+def concrete_maps(c: Canvas, tint: Rgb) -> SurfaceMaps:
     """Smooth concrete: clouds of cement, pores."""
     # Bands are in cycles over the picture: clouds wide, streaks long, grain fine.
-    clouds = noise(rng, shape, slope=2.2, band=(1.0, 120.0))
-    streaks = noise(rng, shape, slope=2.0, stretch=(1.0, 2.5), band=(4.0, 200.0))
-    grain = noise(rng, shape, slope=0.6)
-    dots = noise(rng, shape, slope=0.0, band=(1.0, shape[0] / 4))
+    clouds = c.noise(slope=2.2, band=(1.0, 120.0))
+    streaks = c.noise(slope=2.0, stretch=(1.0, 2.5), band=(4.0, 200.0))
+    grain = c.noise(slope=0.6)
+    dots = c.noise(slope=0.0, band=(1.0, c.shape[0] / 4))
     # Pores are the tail of a noise, beyond about three standard deviations.
     pores = smoothstep(2.9, 3.4, dots)
     tone = 0.045 * clouds + 0.02 * streaks + 0.014 * grain - 0.22 * pores
     colour = np.array(tint, np.float32) * (1.0 + tone)[..., None]
     height = np.asarray(0.0002 * streaks - 0.0015 * pores, np.float32)
-    return surface_maps(colour, 0.62 + 0.05 * clouds, height, size_m, 0.15)
+    return c.maps(colour, 0.62 + 0.05 * clouds, height, 0.15)
 
 
-def carpet_maps(
-    rng: np.random.Generator, shape: Shape2, size_m: tuple[float, float], tint: Rgb, *, loops: bool
-) -> SurfaceMaps:
+def carpet_maps(c: Canvas, tint: Rgb, *, loops: bool) -> SurfaceMaps:
     """Carpet: cut pile brushed here and there, or loops in rows."""
-    pile = noise(rng, shape, slope=0.3, band=(size_m[0] * 40, 1e9))
-    brushed = noise(rng, shape, slope=1.5, band=(2.0, 25.0))
-    fleck = noise(rng, shape, slope=0.6)
+    pile = c.noise(slope=0.3, band=(c.size_m[0] * 40, 1e9))
+    brushed = c.noise(slope=1.5, band=(2.0, 25.0))
+    fleck = c.noise(slope=0.6)
     if loops:
         # Set loops in rows, every other row half a loop on.
-        n = round(size_m[0] / 0.008) // 2 * 2
-        y = (np.arange(shape[0], dtype=np.float32) + 0.5) / shape[0] * n
-        x = (np.arange(shape[1], dtype=np.float32) + 0.5) / shape[1] * n
+        n = round(c.size_m[0] / 0.008) // 2 * 2
+        y = (np.arange(c.shape[0], dtype=np.float32) + 0.5) / c.shape[0] * n
+        x = (np.arange(c.shape[1], dtype=np.float32) + 0.5) / c.shape[1] * n
         shift = np.where(np.floor(y) % 2 == 1, 0.5, 0.0)[:, None]
         loop = np.abs(np.sin(np.pi * (x[None] + shift))) * np.abs(np.sin(np.pi * y))[:, None]
         pile = 1.4 * (loop.astype(np.float32) - 0.4) + 0.6 * pile
     tone = 0.075 * pile + 0.014 * brushed + 0.04 * fleck
     colour = np.array(tint, np.float32) * (1.0 + tone)[..., None]
-    return surface_maps(colour, 1.0, 0.0009 * pile, size_m, 0.0)
+    return c.maps(colour, 1.0, 0.0009 * pile, 0.0)
 
 
 def weave_maps(
-    rng: np.random.Generator,
-    shape: Shape2,
-    size_m: tuple[float, float],
+    c: Canvas,
     tint: Rgb,
     *,
     threads_m: float = 500.0,
@@ -94,9 +80,9 @@ def weave_maps(
 
     threads_m: threads a metre, as many as the picture can show.
     """
-    n = max(8, round(min(threads_m, shape[1] / size_m[0] / 3.2) * size_m[0]) // 4 * 4)
-    y = ((np.arange(shape[0], dtype=np.float32) + 0.5) / shape[0] * n)[:, None]
-    x = ((np.arange(shape[1], dtype=np.float32) + 0.5) / shape[1] * n)[None]
+    n = max(8, round(min(threads_m, c.shape[1] / c.size_m[0] / 3.2) * c.size_m[0]) // 4 * 4)
+    y = ((np.arange(c.shape[0], dtype=np.float32) + 0.5) / c.shape[0] * n)[:, None]
+    x = ((np.arange(c.shape[1], dtype=np.float32) + 0.5) / c.shape[1] * n)[None]
     # Let the warp lie on top in every other crossing, or in twos along a diagonal.
     i, j = np.floor(x).astype(int), np.floor(y).astype(int)
     on_top = (i + j) % 4 < 2 if twill else (i + j) % 2 == 0
@@ -104,28 +90,26 @@ def weave_maps(
     thread_y = np.abs(np.sin(np.pi * y)) ** 0.6
     over = np.where(on_top, thread_x * (0.5 + 0.5 * thread_y), thread_y * (0.5 + 0.5 * thread_x))
     # Vary each thread's thickness and dye.
-    slub_x = noise(rng, shape, slope=1.0, stretch=(20.0, 1.0), band=(1.0, 1e9))
-    slub_y = noise(rng, shape, slope=1.0, stretch=(1.0, 20.0), band=(1.0, 1e9))
+    slub_x = c.noise(slope=1.0, stretch=(20.0, 1.0), band=(1.0, 1e9))
+    slub_y = c.noise(slope=1.0, stretch=(1.0, 20.0), band=(1.0, 1e9))
     slub = np.where(on_top, slub_x, slub_y)
     light = 0.80 + 0.26 * over + 0.045 * slub
     first = np.array(tint, np.float32)
     weft = first * np.float32(0.93) if second is None else np.array(second, np.float32)
     colour = np.where(on_top[..., None], first, weft) * light[..., None]
-    height = np.asarray(0.25 * size_m[0] / n * (over + 0.15 * slub), np.float32)
-    return surface_maps(np.asarray(colour, np.float32), 0.95, height, size_m, 0.0)
+    height = np.asarray(0.25 * c.size_m[0] / n * (over + 0.15 * slub), np.float32)
+    return c.maps(np.asarray(colour, np.float32), 0.95, height, 0.0)
 
 
-def leather_maps(
-    rng: np.random.Generator, shape: Shape2, size_m: tuple[float, float], tint: Rgb
-) -> SurfaceMaps:
+def leather_maps(c: Canvas, tint: Rgb) -> SurfaceMaps:
     """Leather: pebbles parted by fine creases, worn tones."""
-    cells, second = _distances_to_points(rng, shape, int(size_m[0] * size_m[1] / 0.0045**2))
+    cells, second = _distances_to_points(c.rng, c.shape, int(c.size_m[0] * c.size_m[1] / 0.0045**2))
     crease = smoothstep(0.45, 0.0, second - cells)
     creases = blurred(crease, 0.7)
-    clouds = noise(rng, shape, slope=2.6, band=(1.0, 40.0))
+    clouds = c.noise(slope=2.6, band=(1.0, 40.0))
     colour = np.array(tint, np.float32) * (1.0 + 0.035 * clouds - 0.22 * creases)[..., None]
     height = np.asarray(-0.00035 * creases + 0.0004 * clouds, np.float32)
-    return surface_maps(colour, 0.46 + 0.05 * clouds + 0.2 * creases, height, size_m, 0.4)
+    return c.maps(colour, 0.46 + 0.05 * clouds + 0.2 * creases, height, 0.4)
 
 
 def _distances_to_points(rng: np.random.Generator, shape: Shape2, n: int) -> tuple[F32, F32]:

@@ -11,9 +11,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32
-from pbrs_farm.dress.noise import Shape2, coverage, halved, noise, sampled, smoothstep
+from pbrs_farm.dress.noise import coverage, halved, noise, sampled, smoothstep
 from pbrs_farm.dress.style import Rgb, Wood, mix, shade
-from pbrs_farm.dress.surface_maps import SurfaceMaps, ramp, surface_maps
+from pbrs_farm.dress.surface_maps import SurfaceMaps, ramp
+from pbrs_farm.furnishings.textures.canvas import Canvas
 from pbrs_farm.furnishings.textures.wood_sheet import WoodSheet, wood_sheet
 
 _INTS = NDArray[np.int64]
@@ -30,12 +31,9 @@ class BoardLayout:
     n_planks: int
 
 
-def rows_of_planks(
-    rng: np.random.Generator, shape: Shape2, size_m: tuple[float, float], n_rows: int, per_row: int
-) -> BoardLayout:
+def rows_of_planks(c: Canvas, n_rows: int, per_row: int) -> BoardLayout:
     """Rows along u with per_row planks each, ends staggered between neighbours."""
-    rows, columns = shape
-    pixel_m = size_m[0] / columns
+    rows, columns = c.shape
     bounds = np.rint(np.linspace(0, rows, n_rows + 1)).astype(np.int64)
     row_of = np.repeat(np.arange(n_rows), np.diff(bounds))
     # Keep each row's first joint away from its neighbour's.
@@ -44,7 +42,7 @@ def rows_of_planks(
     for r in range(n_rows):
         near = [offsets[r - 1]] if r else []
         near += [offsets[0]] if r == n_rows - 1 and r else []
-        tries = rng.random(12) * step
+        tries = c.rng.random(12) * step
         gaps = [
             min(min(abs(t - o) % step, step - abs(t - o) % step) for o in near) if near else 0
             for t in tries
@@ -61,16 +59,14 @@ def rows_of_planks(
     end_px = np.minimum(start_px + 0.5, step - start_px - 0.5)[row_of]
     height_px = np.diff(bounds)[row_of][:, None]
     side_px = np.minimum(across + 0.5, height_px - across - 0.5)
-    edge_m = np.minimum(end_px, side_px).astype(np.float32) * np.float32(pixel_m)
+    edge_m = np.minimum(end_px, side_px).astype(np.float32) * np.float32(c.pixel_m)
     return BoardLayout(plank, along, across, edge_m, n_rows * per_row)
 
 
-def herringbone(
-    shape: Shape2, size_m: tuple[float, float], ratio: int, periods: int
-) -> BoardLayout:
+def herringbone(c: Canvas, ratio: int, periods: int) -> BoardLayout:
     """Blocks of 1 to ratio, alternately along u and v; periods: how often the pattern repeats."""
     cells = 2 * ratio * periods
-    rows, columns = shape
+    rows, columns = c.shape
     y = (np.arange(rows) + 0.5) * cells / rows
     x = (np.arange(columns) + 0.5) * cells / columns
     j, i = np.floor(y).astype(np.int64)[:, None], np.floor(x).astype(np.int64)[None]
@@ -88,15 +84,14 @@ def herringbone(
         plank=i0 + cells * j0,
         along=(long * cell_px).astype(np.int64),
         across=(short * cell_px).astype(np.int64),
-        edge_m=np.asarray(edge * size_m[0] / cells, np.float32),
+        edge_m=np.asarray(edge * c.size_m[0] / cells, np.float32),
         n_planks=cells * cells,
     )
 
 
-def chevron(shape: Shape2, size_m: tuple[float, float], n_columns: int, n_rows: int) -> BoardLayout:
+def chevron(c: Canvas, n_columns: int, n_rows: int) -> BoardLayout:
     """Columns of planks at 45 degrees that meet in points; n_columns must be even."""
-    rows, columns = shape
-    pixel_m = size_m[0] / columns
+    rows, columns = c.shape
     width_px, height_px = columns / n_columns, rows / n_rows
     x = np.arange(columns)[None] + 0.5
     column = np.floor(x / width_px).astype(np.int64)
@@ -113,7 +108,7 @@ def chevron(shape: Shape2, size_m: tuple[float, float], n_columns: int, n_rows: 
         plank=row + n_rows * column,
         along=along.astype(np.int64),
         across=((in_row - 0.3 * rise) / np.sqrt(2.0)).astype(np.int64),
-        edge_m=np.asarray(np.minimum(side, end) * pixel_m, np.float32),
+        edge_m=np.asarray(np.minimum(side, end) * c.pixel_m, np.float32),
         n_planks=n_rows * n_columns,
     )
 
@@ -130,34 +125,31 @@ class PlankLook:
 
 
 def plank_maps(
-    rng: np.random.Generator,
+    c: Canvas,
     wood: Wood,
     layout: BoardLayout,
-    size_m: tuple[float, float],
     look: PlankLook,
     darkness: float = 0.0,
     sheet: WoodSheet | None = None,
 ) -> SurfaceMaps:
     """Wood cut into the layout's planks. darkness: -1 bleached .. 1 stained."""
-    shape = (layout.plank.shape[0], layout.plank.shape[1])
-    pixel_m = size_m[0] / shape[1]
-    sheet = wood_sheet(rng, wood, (512, shape[1]), pixel_m) if sheet is None else sheet
+    sheet = wood_sheet(c.rng, wood, (512, c.shape[1]), c.pixel_m) if sheet is None else sheet
     n = layout.n_planks
     # Cut each plank from a different place, half of them turned round.
-    rows = _start_of_planks(rng, layout.across, layout.plank, n, sheet.shape[0])
-    columns = _start_of_planks(rng, layout.along, layout.plank, n, sheet.shape[1])
+    rows = _start_of_planks(c.rng, layout.across, layout.plank, n, sheet.shape[0])
+    columns = _start_of_planks(c.rng, layout.along, layout.plank, n, sheet.shape[1])
     tone = sampled(sheet.tone, rows, columns)
     # Vary the brightness and warmth of each plank.
     light, dark = _stained(wood, darkness)
     colour = ramp(tone, dark, light)
     bright = 1.0 + np.clip(
-        rng.normal(0, look.variation, n), -2 * look.variation, 2 * look.variation
+        c.rng.normal(0, look.variation, n), -2 * look.variation, 2 * look.variation
     )
-    warm = np.clip(rng.normal(0, 0.2 * look.variation, n), -0.03, 0.03)
+    warm = np.clip(c.rng.normal(0, 0.2 * look.variation, n), -0.03, 0.03)
     tint = np.stack([bright * (1 + warm), bright, bright * (1 - 1.3 * warm)], -1)
     colour *= tint.astype(np.float32)[layout.plank]
     # Darken the joints and the edge beside them.
-    joint = coverage(layout.edge_m, look.joint_m / 2, pixel_m)
+    joint = coverage(layout.edge_m, look.joint_m / 2, c.pixel_m)
     beside = smoothstep(max(look.bevel_m, 0.003), 0.0, layout.edge_m)
     colour *= (1.0 - 0.62 * joint - 0.06 * beside)[..., None]
     height = 0.00006 * tone - 0.0008 * joint
@@ -166,9 +158,9 @@ def plank_maps(
     rough = look.roughness + 0.10 * (0.62 - tone) + 0.3 * joint
     # Let the varnish be smudged; its map is half as fine.
     rough = halved(np.asarray(rough, np.float32))
-    smudge = noise(rng, (rough.shape[0], rough.shape[1]), slope=2.5)
+    smudge = noise(c.rng, (rough.shape[0], rough.shape[1]), slope=2.5)
     rough = rough + 0.015 * np.clip(smudge, -2, 2)
-    return surface_maps(colour, rough, height, size_m, look.gloss)
+    return c.maps(colour, rough, height, look.gloss)
 
 
 def _start_of_planks(
@@ -179,22 +171,14 @@ def _start_of_planks(
     return np.asarray(pixels.astype(np.int32) * turn[plank] + start[plank], np.int32)
 
 
-def grain_maps(
-    rng: np.random.Generator,
-    wood: Wood,
-    size_m: tuple[float, float] = (1.0, 0.5),
-    edge_px: int = 512,
-    roughness: float = 0.4,
-) -> SurfaceMaps:
+def grain_maps(c: Canvas, wood: Wood, roughness: float = 0.4) -> SurfaceMaps:
     """Veneer without joints, the grain along u, for furniture.
 
     The sheet is laid narrower than it is drawn: rings of veneer are half as wide as those of planks.
     """
-    sheet = wood_sheet(rng, wood, (edge_px, edge_px), size_m[0] / edge_px)
+    sheet = wood_sheet(c.rng, wood, (c.shape[1], c.shape[1]), c.pixel_m)
     colour = ramp(sheet.tone, wood.dark, wood.light)
-    return surface_maps(
-        colour, roughness + 0.12 * (0.62 - sheet.tone), 0.00005 * sheet.tone, size_m, 0.5
-    )
+    return c.maps(colour, roughness + 0.12 * (0.62 - sheet.tone), 0.00005 * sheet.tone, 0.5)
 
 
 def _stained(wood: Wood, darkness: float) -> tuple[Rgb, Rgb]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Sequence
 from functools import partial
 
 import numpy as np
@@ -10,7 +10,8 @@ import numpy as np
 from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.dress.noise import Shape2, noise, smoothstep
 from pbrs_farm.dress.style import Rgb, mix, shade
-from pbrs_farm.dress.surface_maps import SurfaceMaps, surface_maps
+from pbrs_farm.dress.surface_maps import SurfaceMaps
+from pbrs_farm.furnishings.textures.canvas import Canvas
 
 WIDTH_M = 0.53  # width of a roll
 
@@ -18,46 +19,37 @@ PATTERNS = ("stripes", "damask", "geometric", "leaves")
 PLAIN = ("linen", "grasscloth")  # of one colour
 
 
-def wallpaper_maps(
-    rng: np.random.Generator,
-    shape: Shape2,
-    pattern: str,
-    ground: Rgb,
-    print_colour: Rgb,
-    accent: Rgb,
-) -> SurfaceMaps:
-    """One repeat of WIDTH_M square; ground and print as sRGB-encoded colours."""
-    masks = _DRAWN[pattern](rng, shape)
-    colour = np.broadcast_to(np.array(ground, np.float32), (*shape, 3)).copy()
+def wallpaper_maps(c: Canvas, pattern: str, tints: Sequence[Rgb]) -> SurfaceMaps:
+    """Paper printed with one repeat of WIDTH_M square; tints: ground, print, accent."""
+    masks = _DRAWN[pattern](c.rng, c.shape)
+    colour = _inked(c, masks, tints)
+    # Show the paper's own fibres.
+    paper = c.noise(slope=0.5)
+    clouds = c.noise(slope=3.0, band=(1.0, 8.0))
+    colour *= (1.0 + 0.010 * paper + 0.004 * clouds)[..., None]
+    height = np.asarray(0.00006 * paper + 0.00012 * masks[0], np.float32)
+    return c.maps(colour, 0.8, height, 0.0)
+
+
+def printed_carpet_maps(c: Canvas, pattern: str, tints: Sequence[Rgb]) -> SurfaceMaps:
+    """Cut pile in the colours of a wallpaper's pattern, tints: ground, print, accent."""
+    masks = _DRAWN[pattern](c.rng, c.shape)
+    pile = c.noise(slope=0.3, band=(c.size_m[0] * 40, 1e9))
+    fleck = c.noise(slope=0.6)
+    colour = _inked(c, masks, tints)
+    colour *= (1.0 + 0.075 * pile + 0.04 * fleck)[..., None]
+    return c.maps(colour, 1.0, np.asarray(0.0009 * pile, np.float32), 0.0)
+
+
+def _inked(c: Canvas, masks: Iterable[F32], tints: Sequence[Rgb]) -> F32:
+    """(H, W, 3) ground, print and accent, and a third ink between the first two."""
+    ground, print_colour, accent = tints[:3]
+    colour = np.broadcast_to(np.array(ground, np.float32), (*c.shape, 3)).copy()
     for mask, ink in zip(
         masks, (print_colour, accent, mix(ground, print_colour, 0.5)), strict=False
     ):
         colour += mask[..., None] * (np.array(ink, np.float32) - colour)
-    # Show the paper's own fibres.
-    paper = noise(rng, shape, slope=0.5)
-    clouds = noise(rng, shape, slope=3.0, band=(1.0, 8.0))
-    colour *= (1.0 + 0.010 * paper + 0.004 * clouds)[..., None]
-    height = np.asarray(0.00006 * paper + 0.00012 * masks[0], np.float32)
-    size_m = (WIDTH_M, WIDTH_M)
-    return surface_maps(colour, 0.8, height, size_m, 0.0)
-
-
-def printed_carpet_maps(
-    rng: np.random.Generator,
-    shape: Shape2,
-    size_m: tuple[float, float],
-    pattern: str,
-    tints: tuple[Rgb, Rgb, Rgb],
-) -> SurfaceMaps:
-    """Cut pile in the colours of a wallpaper's pattern, as large as size_m: ground, print, accent."""
-    masks = _DRAWN[pattern](rng, shape)
-    pile = noise(rng, shape, slope=0.3, band=(size_m[0] * 40, 1e9))
-    fleck = noise(rng, shape, slope=0.6)
-    colour = np.broadcast_to(np.array(tints[0], np.float32), (*shape, 3)).copy()
-    for mask, ink in zip(masks, (tints[1], tints[2], mix(tints[0], tints[1], 0.5)), strict=False):
-        colour += mask[..., None] * (np.array(ink, np.float32) - colour)
-    colour *= (1.0 + 0.075 * pile + 0.04 * fleck)[..., None]
-    return surface_maps(colour, 1.0, np.asarray(0.0009 * pile, np.float32), size_m, 0.0)
+    return colour
 
 
 def inks(rng: np.random.Generator, ground: Rgb, accent: Rgb) -> tuple[Rgb, Rgb]:
