@@ -8,7 +8,7 @@ from typing import Final
 from numpy import pi, radians
 
 from pbrs_farm.core.classes import OTHERFURNITURE
-from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_z
+from pbrs_farm.core.frames import rotation_z
 from pbrs_farm.dress.thing_materials import (
     BLACK_GLASS,
     BLACK_STEEL,
@@ -33,7 +33,7 @@ _DOOR_RAD: Final = radians(95)
 def kettle(m: Maker) -> None:
     """A kettle with a lid and a spout."""
     r = 0.085
-    side = m.metal if m.chance(0.7) else plain("enamel", m.any_colour(), 0.2)
+    side = m.metal if m.chance(0.7) else m.coloured("enamel", 0.2)
     # A body that narrows upwards, its lid and the lid's knob.
     m.revolve([(0, 0), (r, 0), (r, 0.02), (r * 0.75, 0.17), (r * 0.6, 0.185), (0.012, 0.19),
         (0.016, 0.21), (0, 0.213)], of=side)
@@ -71,8 +71,7 @@ def coffee_machine(m: Maker) -> None:
             m.tube(bent([(w - 0.03, 0.2396, 0.06), (w - 0.03, 0.16, 0.065), (w - 0.02, 0.1, 0.1)],
                 0.03), 0.005, n=6, of=CHROME)
             for x in (-0.06, 0.0, 0.06):
-                m.frustum((0.012, 0), (0.011, 0.008), n=12, turn=LYING_ALONG_Z, at=(x, 0.29, 0.1),
-                    of=CHROME)
+                m.frustum((0.012, 0), (0.011, 0.008), n=12, front=(x, 0.29, 0.1), of=CHROME)
             for x, z in product((-w + 0.025, w - 0.025), (-0.12, 0.11)):
                 m.cylinder(0.015, 0, 0.0125, n=10, at=(x, 0, z), of=black)
         case 2:
@@ -151,8 +150,8 @@ def microwave(m: Maker) -> None:
         m.box(panel - 0.03, 0.022, 0.003, 0.001, x=x, on=0.026, against=front, of=keys)
     if m.chance(0.45):
         for y in (h * 0.34, h * 0.58):
-            m.turned([(0.021, 0), (0.019, 0.016), (0.016, 0.018)], n=20, turn=LYING_ALONG_Z,
-                at=(x, y, front - 0.001), of=m.pick(CHROME, keys, black))
+            m.turned([(0.021, 0), (0.019, 0.016), (0.016, 0.018)], n=20, front=(x, y,
+                front - 0.001), of=m.pick(CHROME, keys, black))
             m.box(0.003, 0.016, 0.0006, x=x, on=y + 0.001, against=front + 0.0168, of=RUBBER)
     else:
         for i, k in product(range(3), range(m.pick(4, 5))):

@@ -16,7 +16,7 @@ def toiletries(m: Maker) -> None:
     x = 0.0
     for _k in range(m.integers(1, 5)):
         form, r, tall = m.integers(0, 7), m.uniform(0.018, 0.036), m.uniform(0.08, 0.21)
-        side, cap = (plain("bottle", m.any_colour(), 0.3), plain("cap",
+        side, cap = (m.coloured("bottle", 0.3), plain("cap",
             (0.9, 0.9, 0.88) if m.chance(0.6) else (0.1, 0.1, 0.1), 0.35))
         x += r
         with m.moved(at=(x, 0.0, m.uniform(-0.02, 0.02))):
@@ -89,7 +89,7 @@ def soap_bar(m: Maker) -> None:
 def spray_bottle(m: Maker) -> None:
     """A spray bottle of cleaner."""
     m.turned([(0.038, 0), (0.038, 0.14), (0.014, 0.19), (0.014, 0.2)], n=14,
-        of=plain("bottle", m.any_colour(), 0.25))
+        of=m.coloured("bottle", 0.25))
     # Head and trigger point along +z.
     with m.of(plain("spray head", (0.9, 0.9, 0.9), 0.4)):
         m.box(0.024, (0.2002, 0.232), 0.075, z=0.0125)
@@ -108,5 +108,5 @@ def toilet_rolls(m: Maker) -> None:
     """One to three rolls of paper on end."""
     # A tube of 20 mm inner radius, closed onto itself.
     for k in range(m.integers(1, 4)):
-        m.revolve([(0.02, 0), (0.054, 0), (0.054, 0.098), (0.02, 0.098), (0.02, 0)], n=18,
-            at=(0, 0.0985 * k, 0), of=plain("tissue", (0.93, 0.93, 0.92), 0.95))
+        m.ring((0.02, 0.054), (0, 0.098), n=18, at=(0, 0.0985 * k, 0), of=plain("tissue", (0.93,
+            0.93, 0.92), 0.95))

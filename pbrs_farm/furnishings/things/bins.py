@@ -34,7 +34,7 @@ def bin(m: Maker) -> None:
 
 def bin_of(m: Maker, form: int, r: float, tall: float) -> None:
     """A bin about 2 r wide. form: 0 to 16; tall: without its lid."""
-    material = m.metal if m.chance(0.3) else plain("bin", m.any_colour(), 0.5)
+    material = m.metal if m.chance(0.3) else m.coloured("bin", 0.5)
     match form:
         case 0 | 1:  # for paper
             m.vessel([(0, 0), (r * 0.85, 0), (r, tall)], 0.003, n=20 if form == 0 else 28,
@@ -48,7 +48,7 @@ def bin_of(m: Maker, form: int, r: float, tall: float) -> None:
                 of=material)
             m.loft(rings(rect, [(1.95 * r, 1.65 * r, 0.04, tall * 1.2 + 0.0002),
                 (1.95 * r, 1.65 * r, 0.04, tall * 1.25), (1.5 * r, 1.2 * r, 0.03, tall * 1.42)]),
-                of=plain("lid", m.any_colour(), 0.5))
+                of=m.coloured("lid", 0.5))
         case 6:  # square
             m.loft(rings(rect, [(1.7 * r, 1.2 * r, 0.02, 0), (2 * r, 1.5 * r, 0.02, tall),
                 (2 * r - 0.008, 1.5 * r - 0.008, 0.018, tall), (1.7 * r - 0.006, 1.2 * r - 0.006,
@@ -151,7 +151,7 @@ def bag_bin(m: Maker, r: float, tall: float) -> None:
         for x in (-0.85, 0.85):
             m.rod(x * r, tall * 1.3, (-0.6 * r, 0.6 * r), 0.009, n=7)
     m.loft(rings(rect, [(1.0 * r, 0.8 * r, 0.03, 0.18 * tall),
-        (1.62 * r, 0.92 * r, 0.04, tall * 1.28)], n=3), of=plain("bag", m.any_colour(), 0.95))
+        (1.62 * r, 0.92 * r, 0.04, tall * 1.28)], n=3), of=m.coloured("bag", 0.95))
 
 
 def _drawn_size(m: Maker) -> Size:

@@ -7,7 +7,7 @@ from typing import Final
 
 import numpy as np
 
-from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_y, rotation_z
+from pbrs_farm.core.frames import rotation_x, rotation_y, rotation_z
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import Rgb, shade
 from pbrs_farm.dress.thing_materials import glass, plain
@@ -63,7 +63,7 @@ def bottle(m: Maker) -> None:
     if m.chance(0.8):
         _composed(m)
         return
-    cap = m.pick(m.metal, plain("cap", m.any_colour(), 0.4), plain("cork", (0.7, 0.55, 0.38), 0.9))
+    cap = m.pick(m.metal, m.coloured("cap", 0.4), plain("cork", (0.7, 0.55, 0.38), 0.9))
     r, tall = m.uniform(0.03, 0.041), m.uniform(0.22, 0.32)
     match m.integers(0, 7):
         case 0:  # water: waves in its side
@@ -71,8 +71,8 @@ def bottle(m: Maker) -> None:
                 (r * 0.93, 0.08), (r, 0.09), (r, tall * 0.65), (r * 0.4, tall * 0.88),
                 (0.013, tall * 0.9), (0.013, tall * 0.94)], n=18,
                 of=glass((0.85, 0.93, 0.97), 0.25))
-            sleeve(m, r, 0.1, tall * 0.58, plain("label", m.any_colour(), 0.5))
-            m.cylinder(0.015, tall * 0.9402, tall, n=14, of=plain("cap", m.any_colour(), 0.4))
+            sleeve(m, r, 0.1, tall * 0.58, m.coloured("label", 0.5))
+            m.cylinder(0.015, tall * 0.9402, tall, n=14, of=m.coloured("cap", 0.4))
         case 1:  # square, with a stopper
             m.loft(rings(rect, [(0.075, 0.075, 0.01, 0), (0.078, 0.078, 0.012, 0.13),
                 (0.05, 0.05, 0.014, 0.15), (0.03, 0.03, 0.0145, 0.16), (0.03, 0.03, 0.0145, 0.19)],
@@ -84,13 +84,13 @@ def bottle(m: Maker) -> None:
         case 2:  # juice or milk in a carton with a gable
             m.loft(rings(rect, [(0.07, 0.07, 0.002, 0), (0.07, 0.07, 0.002, 0.195),
                 (0.07, 0.006, 0.002, 0.23), (0.07, 0.003, 0.0012, 0.25)], n=1), sharp=20.0,
-                of=plain("carton", m.any_colour(), 0.5))
+                of=m.coloured("carton", 0.5))
             m.box(0.068, (0.05, 0.15), (0.035, 0.0356), of=plain("print", (0.93, 0.92, 0.88), 0.5))
             m.cylinder(0.012, 0, 0.012, n=12, turn=rotation_x(0.7), at=(0, 0.21, 0.019),
-                of=plain("cap", m.any_colour(), 0.4))
+                of=m.coloured("cap", 0.4))
         case 3:  # a thermos
             m.turned([(0.04, 0), (0.042, 0.006), (0.042, 0.2), (0.034, 0.225)], n=22,
-                of=m.pick(m.metal, plain("flask", m.any_colour(), 0.35)))
+                of=m.pick(m.metal, m.coloured("flask", 0.35)))
             m.revolve([(0, 0.2252), (0.034, 0.2252), (0.032, 0.27), (0, 0.272)], n=20,
                 of=plain("cup", (0.12, 0.12, 0.12), 0.5))
             m.tube(bent([(0.04, 0.19, 0), (0.075, 0.185, 0), (0.075, 0.06, 0), (0.04, 0.055, 0)],
@@ -149,7 +149,7 @@ def _composed(m: Maker) -> None:
 def _close(m: Maker, mouth: float, top: float, tall: float) -> None:
     """One of nine closures for a mouth of a radius at a height, or none."""
     y, q = top + 0.0002, mouth
-    cap = m.pick(m.metal, plain("cap", m.any_colour(), 0.4), plain("cap", (0.1, 0.1, 0.1), 0.4))
+    cap = m.pick(m.metal, m.coloured("cap", 0.4), plain("cap", (0.1, 0.1, 0.1), 0.4))
     cork = plain("cork", (0.7, 0.55, 0.38), 0.9)
     match m.integers(0, 10):
         case 0:  # a cork, partly out of the neck
@@ -214,7 +214,7 @@ def _label(m: Maker, profile: Sequence[tuple[float, float]], straight: tuple[flo
         case 3:
             middle = (low + high) / 2
             band(low, middle - 0.004, paper)
-            band(middle + 0.006, high, plain("band", m.any_colour(), 0.6))
+            band(middle + 0.006, high, m.coloured("band", 0.6))
         case 4:
             band(low, high - 0.3 * (high - low), paper)
             top = profile[-1][1]
@@ -226,7 +226,7 @@ def _label(m: Maker, profile: Sequence[tuple[float, float]], straight: tuple[flo
 def sleeve(m: Maker, r: float, low: float, high: float, paper: Material) -> None:
     """A label round a bottle of radius r, 0.4 mm proud of it."""
     inner, outer = r - 0.001, r + 0.0004
-    m.revolve([(inner, low), (outer, low), (outer, high), (inner, high), (inner, low)], of=paper)
+    m.ring((inner, outer), (low, high), of=paper)
 
 
 @thing(group="kitchen_tool")
@@ -252,7 +252,7 @@ def jar(m: Maker) -> None:
         case 2 | 3:
             stoppered_jar(m, r, tall, form, grain)
         case 4:  # tin
-            paint_of = plain("tin", m.any_colour(), 0.3)
+            paint_of = m.coloured("tin", 0.3)
             m.cylinder(r, 0, tall * 0.85, n=22, of=paint_of)
             m.turned([(r + 0.002, tall * 0.8502), (r + 0.002, tall * 0.97), (r * 0.9, tall)], n=22,
                 of=m.pick(paint_of, m.metal))
@@ -272,7 +272,7 @@ def jar(m: Maker) -> None:
                 of=plain("jam", m.pick((0.4, 0.03, 0.06), (0.75, 0.42, 0.06), (0.8, 0.3, 0.05)),
                 0.12))
             m.revolve([(0, 0.0802), (0.033, 0.0802), (0.045, 0.072), (0.046, 0.074), (0.034, 0.096),
-                (0, 0.097)], n=18, of=plain("cloth", m.any_colour(), 0.95))
+                (0, 0.097)], n=18, of=m.coloured("cloth", 0.95))
         case 9:  # utensils in a pot
             m.vessel([(0, 0), (0.05, 0), (0.055, 0.14)], 0.004, n=20, of=m.china())
             for k in range(m.integers(3, 7)):
@@ -298,12 +298,12 @@ def jar(m: Maker) -> None:
                     m.box((-0.13 + 0.03 * k, 0.13 - 0.02 * k), 0.34 - 0.06 * k, (0, 0.016), 0.004,
                         of=plain("board wood", shade(m.wood, m.uniform(0.75, 1.2)), 0.6))
         case 12:  # a kitchen scale
-            paint_of = plain("scale", m.any_colour(), 0.35)
+            paint_of = m.coloured("scale", 0.35)
             m.box(0.18, 0.05, 0.14, 0.012, of=paint_of)
             m.turned([(0.012, 0), (0.012, 0.02), (0.1, 0.03), (0.11, 0.045), (0.107, 0.046),
                 (0.09, 0.034)], n=26, at=(0, 0.049, 0), of=m.metal)
-            m.frustum((0.035, 0), (0.033, 0.004), n=20, turn=LYING_ALONG_Z, at=(0, 0.025, 0.0695),
-                of=plain("dial", (0.93, 0.92, 0.88), 0.4))
+            m.frustum((0.035, 0), (0.033, 0.004), n=20, front=(0, 0.025, 0.0695), of=plain("dial",
+                (0.93, 0.92, 0.88), 0.4))
 
 
 def stoppered_jar(m: Maker, r: float, tall: float, form: int, grain: Rgb) -> None:

@@ -8,7 +8,7 @@ import numpy as np
 from numpy import cos, pi, sin
 
 from pbrs_farm.core.classes import BOX
-from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_y
+from pbrs_farm.core.frames import rotation_x, rotation_y
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import Rgb, mix, shade
 from pbrs_farm.dress.thing_materials import plain
@@ -49,13 +49,12 @@ def storage_box(m: Maker) -> None:
         case 4:  # round, as for hats
             r = 0.42 * d + 0.03
             m.cylinder(r, 0, h * 0.8, n=28, of=card)
-            m.cylinder(r + 0.004, h * 0.8 + 0.0002, h, n=28, of=plain("lid", m.any_colour(), 0.6))
+            m.cylinder(r + 0.004, h * 0.8 + 0.0002, h, n=28, of=m.coloured("lid", 0.6))
         case 5:  # a tin with round corners
-            with m.of(plain("tin", colour, 0.3)):
-                m.loft(rings(rect, [(w * 0.8, d * 0.8, 0.03, 0), (w * 0.8, d * 0.8, 0.03, h * 0.8),
+            m.loft(rings(rect, [(w * 0.8, d * 0.8, 0.03, 0), (w * 0.8, d * 0.8, 0.03, h * 0.8),
                     (w * 0.8 + 0.006, d * 0.8 + 0.006, 0.033, h * 0.8),
                     (w * 0.8 + 0.006, d * 0.8 + 0.006, 0.033, h * 0.95),
-                    (w * 0.8 - 0.01, d * 0.8 - 0.01, 0.028, h)]))
+                    (w * 0.8 - 0.01, d * 0.8 - 0.01, 0.028, h)]), of=plain("tin", colour, 0.3))
         case 6:  # corners of metal
             lidded_box(m, w, h, d, card, card)
             for x, z in product((-1, 1), (-1, 1)):
@@ -67,10 +66,10 @@ def storage_box(m: Maker) -> None:
             m.box(0.8 * w, h * 0.6, 0.8 * d, 0.003, of=grain)
             m.box(0.8 * w, (h * 0.6 + 0.001, h * 0.75), 0.8 * d, 0.003, of=grain)
             m.revolve([(0, 0), (0.005, 0), (0.01, 0.008), (0.009, 0.016), (0, 0.018)], n=12,
-                turn=LYING_ALONG_Z, at=(0, h * 0.66, d * 0.4), of=m.metal)
+                front=(0, h * 0.66, d * 0.4), of=m.metal)
         case 8:  # two on each other
             lidded_box(m, w, h * 0.8, d, card, card)
-            side, lid = plain("box", m.any_colour(), 0.7), plain("lid", m.any_colour(), 0.7)
+            side, lid = m.coloured("box", 0.7), m.coloured("lid", 0.7)
             with m.moved(at=(0, h * 0.8 + 0.0003, 0), turn=rotation_y(m.uniform(-0.1, 0.1))):
                 lidded_box(m, w * 0.8, h * 0.6, d * 0.8, side, lid)
         case 9:
@@ -80,8 +79,8 @@ def storage_box(m: Maker) -> None:
             for k in range(2):
                 m.box(0.86 * w, (0.006 + k * 0.5 * h, (k + 1) * 0.5 * h - 0.006), 0.007, 0.001,
                     against=hd - 0.001, of=plain("drawer", shade(colour, 0.92), 0.7))
-                m.revolve([(0, 0), (0.004, 0), (0.008, 0.006), (0, 0.012)], n=10,
-                    turn=LYING_ALONG_Z, at=(0, (k + 0.5) * 0.5 * h, hd + 0.0055), of=m.metal)
+                m.revolve([(0, 0), (0.004, 0), (0.008, 0.006), (0, 0.012)], n=10, front=(0,
+                    (k + 0.5) * 0.5 * h, hd + 0.0055), of=m.metal)
 
 
 def slatted_crate(m: Maker, w: float, h: float, d: float, grain: Material) -> None:
@@ -158,14 +157,14 @@ def shelf_basket(m: Maker) -> None:
                     m.box(0.014, h + 0.02, 0.014, 0.001, left=x, against=z)
                 m.box(w - 0.028, (h - 0.016, h), 0.014, 0.001, against=-d / 2, mirrored="z")
                 m.box(0.014, (h - 0.016, h), d - 0.028, 0.001, left=-w / 2, mirrored="x")
-            with m.moved(at=(0, 0.012, 0)), m.of(plain("cloth", m.any_colour(), 0.95)):
+            with m.moved(at=(0, 0.012, 0)), m.of(m.coloured("cloth", 0.95)):
                 tray(m, w - 0.03, h - 0.03, d - 0.03, 0.005)
         case 7:  # round, with coloured bands
             m.vessel(scaled(d, h, [(0, 0), (0.4, 0), (0.52, 0.3), (0.55, 0.7), (0.5, 1)]), 0.008,
                 n=24, of=weave)
             for t in (0.25, 0.5, 0.75):
                 m.tube(ring_path((0.5 + 0.05 * sin(pi * t)) * d, y=t * h, n=24), 0.004, n=5,
-                    of=plain("band", m.any_colour(), 0.9))
+                    of=m.coloured("band", 0.9))
 
 
 def rope_side(m: Maker, w: float, d: float, out: float, h: float, n: int,
@@ -213,13 +212,13 @@ def basket(m: Maker) -> None:
                 of=weave)
             for k in range(3):
                 m.sphere(polar(0.45 * r, tall * 0.62, 2.1 * k), 0.42 * r, n=12,
-                    of=plain("wool", m.any_colour(), 0.95))
+                    of=m.coloured("wool", 0.95))
         case 6:  # rolled blankets
             m.vessel([(0, 0), (r * 0.95, 0), (r, tall)], 0.01, n=20, of=weave)
             for k in range(3):
                 m.tube([polar(0.45 * r, 0.014, 2.1 * k), (0.5 * r * cos(2.1 * k),
                     tall * m.uniform(1.2, 1.6), 0.5 * r * sin(2.1 * k))], 0.36 * r, n=12,
-                    of=plain("blanket", m.any_colour(), 0.95))
+                    of=m.coloured("blanket", 0.95))
         case 7:  # two tones: its lower half painted
             m.vessel(scaled(r, tall, [(0, 0), (0.9, 0), (1, 0.45), (0.99, 0.449)]), 0.01, n=22,
                 of=plain("paint", (0.9, 0.89, 0.86), 0.8))
@@ -267,7 +266,7 @@ def tray(m: Maker, w: float, h: float, d: float, t: float) -> None:
 @thing(group="box", nyu40=BOX)
 def tissue_box(m: Maker) -> None:
     """A box of tissues with one standing out."""
-    m.box(0.23, 0.085, 0.12, of=plain("box", m.any_colour(), 0.6))
+    m.box(0.23, 0.085, 0.12, of=m.coloured("box", 0.6))
     # The tissue is a thin sheet that leans, its foot inside the box.
     m.box(0.09, (-0.005, 0.065), 0.004, name="tissue", turn=rotation_x(0.35), at=(0, 0.08, 0),
         of=plain("tissue", (0.93, 0.93, 0.92), 0.95))
@@ -281,6 +280,5 @@ def laundry_basket(m: Maker) -> None:
     m.vessel(scaled(r, tall, [(0, 0), (0.86, 0), (0.93, 0.3), (1, 0.8), (0.99, 1)]), 0.012, n=24,
         of=plain("wicker", weave, 0.9))
     for _k in range(2):
-        m.bulged((1.25 * r, m.uniform(0.08, 0.13), 1.2 * r), n=8,
-            at=(m.uniform(-0.15, 0.15) * r, tall - 0.03, m.uniform(-0.15, 0.15) * r),
-            of=plain("cloth", m.any_colour(), 0.95))
+        m.bulged((1.25 * r, m.uniform(0.08, 0.13), 1.2 * r), n=8, at=(m.uniform(-0.15, 0.15) * r,
+            tall - 0.03, m.uniform(-0.15, 0.15) * r), of=m.coloured("cloth", 0.95))

@@ -96,8 +96,7 @@ def wheel(m: Maker, r: float, h: float, of: Material) -> None:
     """A ring, of wood or metal, on three wires, candles round it."""
     q, kind, n = r - 0.05, m.pick("candle", "candle", "ball", "bell"), m.integers(6, 11)
     rim = m.pick(of, m.timber, m.dark_timber)
-    m.revolve([(q - 0.02, 0.0), (q + 0.02, 0.0), (q + 0.02, 0.045), (q - 0.02, 0.045),
-        (q - 0.02, 0.0)], n=40, of=rim)
+    m.ring((q - 0.02, q + 0.02), (0.0, 0.045), n=40, of=rim)
     if m.chance(0.5):
         for k in range(2):
             turn = rotation_y(pi / 2 * k)

@@ -16,7 +16,7 @@ from pbrs_farm.geometry.outlines import bent, rect, rings
 def clock(m: Maker) -> None:
     """A table clock: digital, round, with two bells, a wedge, for a mantel, under a glass dome."""
     form = m.integers(0, 13)
-    material = m.metal if m.chance(0.35) else plain("clock", m.any_colour(), 0.4)
+    material = m.metal if m.chance(0.35) else m.coloured("clock", 0.4)
     grain = plain("clock wood", m.wood, 0.45)
     match form:
         case 0:  # digital
@@ -119,8 +119,8 @@ def clock_radio(m: Maker, material: Material, grain: Material) -> None:
     m.box((-0.11, 0.02), (0.02, 0.1), (0.049, 0.053), 0.002,
         of=plain("grille", (0.2, 0.2, 0.21), 0.9))
     m.box((0.035, 0.11), (0.06, 0.1), (0.05, 0.0506), of=plain("display", (0.05, 0.06, 0.05), 0.1))
-    m.revolve([(0, 0), (0.016, 0), (0.014, 0.012), (0, 0.013)], turn=LYING_ALONG_Z,
-        at=(0.072, 0.035, 0.0495), of=m.metal)
+    m.revolve([(0, 0), (0.016, 0), (0.014, 0.012), (0, 0.013)], front=(0.072, 0.035, 0.0495),
+        of=m.metal)
     for x, z in product((-0.1, 0.1), (-0.035, 0.035)):
         m.rod(x, (0, 0.006), z, 0.008, of=plain("foot", (0.1, 0.1, 0.1), 0.8))
 

@@ -82,7 +82,7 @@ def bag(m: Maker) -> None:
     """A bag: for shopping, of paper, a tote, a rucksack, a handbag, a sports bag."""
     form, w, h, d, t = (m.integers(0, 7), m.uniform(0.3, 0.4), m.uniform(0.28, 0.38),
         m.uniform(0.1, 0.14), 0.004)
-    material, trim = (plain("bag", m.any_colour(), 0.85), plain("strap",
+    material, trim = (m.coloured("bag", 0.85), plain("strap",
         m.pick((0.35, 0.22, 0.13), (0.1, 0.1, 0.1)), 0.7))
     match form:
         case 0 | 1:  # for shopping, of cloth or paper
@@ -110,7 +110,7 @@ def bag(m: Maker) -> None:
             h, w = h * 1.15, w * 0.85
             m.rounded(w, h, 0.16, 0.06, of=material)
             m.rounded(0.72 * w, (0.03, h * 0.5), (0.07, 0.12), 0.03,
-                of=material if form == 3 else plain("pocket", m.any_colour(), 0.85))
+                of=material if form == 3 else m.coloured("pocket", 0.85))
             for x in (-1.0, 1.0):
                 m.tube(bent([(x * w * 0.22, h * 0.93, -0.075), (x * w * 0.25, h * 0.8, -0.12),
                     (x * w * 0.3, h * 0.3, -0.12), (x * w * 0.36, 0.04, -0.07)], 0.06, n=3), 0.014,

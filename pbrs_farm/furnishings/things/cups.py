@@ -82,7 +82,7 @@ def cup(m: Maker) -> None:
                 (r + 0.028, tall * 0.22, 0), (r - 0.001, tall * 0.22, 0)], 0.015, n=3), 0.003, n=6,
                 of=coat)
         case 11:  # for the way: a lid and a sleeve
-            m.frustum((0.029, 0), (0.038, 0.13), n=20, of=plain("cup", m.any_colour(), 0.5))
+            m.frustum((0.029, 0), (0.038, 0.13), n=20, of=m.coloured("cup", 0.5))
             m.revolve([(0.0325, 0.045), (0.0335, 0.045), (0.037, 0.095), (0.0355, 0.095),
                 (0.0325, 0.045)], n=20, of=plain("sleeve", (0.35, 0.24, 0.16), 0.8))
             m.turned([(0.04, 0.1302), (0.04, 0.138), (0.034, 0.145)], n=20,

@@ -7,7 +7,7 @@ from itertools import product
 from numpy import pi
 
 from pbrs_farm.core.classes import BOOKS, PAPER
-from pbrs_farm.core.frames import LYING_ALONG_X, LYING_ALONG_Z, rotation_x, rotation_y, rotation_z
+from pbrs_farm.core.frames import LYING_ALONG_X, rotation_x, rotation_y, rotation_z
 from pbrs_farm.dress.style import shade
 from pbrs_farm.dress.thing_materials import BLACK_GLASS, BLACK_STEEL, CHROME, STEEL, plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
@@ -50,8 +50,7 @@ def laptop(m: Maker) -> None:
     keys = plain("keys", m.pick((0.06, 0.06, 0.06), (0.09, 0.09, 0.09), (0.8, 0.8, 0.8)), 0.6)
     y, round_m = 0.016, m.pick(0.004, 0.01, 0.016)
     m.board(w, d, 0.002, y, round_m, 0.0025, of=shell)
-    for x, z in product((0.03 - w / 2, w / 2 - 0.03), (0.03 - d / 2, d / 2 - 0.03)):
-        m.cylinder(0.008, 0.0, 0.0022, n=10, at=(x, 0, z), of=dark)
+    m.cylinder(0.008, 0.0, 0.0022, n=10, of=dark, at=(0.03 - w / 2, 0, 0.03 - d / 2), mirrored="xz")
     has_numbers = w > 0.335 and m.chance(0.5)
     columns, wide = (16, 0.93 * w) if has_numbers else (m.pick(12, 13, 14), m.pick(0.82, 0.9) * w)
     step, back = wide / columns, -0.38 * d
@@ -79,8 +78,7 @@ def laptop(m: Maker) -> None:
         m.box(w - 0.004, (0.008, d - 0.002), 0.0006, against=0.0, of=dark)
         m.box(w - 2 * b, (m.pick(0.016, 0.03), d - b - 0.003), 0.0004, against=0.0006,
             of=plain("screen", (0.02, 0.02, 0.025), 0.08))
-        m.cylinder(0.0018, 0.0, 0.0003, n=10, turn=LYING_ALONG_Z, at=(0, d - 0.5 * b - 0.002,
-            0.0005), of=CHROME)
+        m.cylinder(0.0018, 0.0, 0.0003, n=10, front=(0, d - 0.5 * b - 0.002, 0.0005), of=CHROME)
         if m.chance(0.6):  # a mark on the lid's back
             m.box(0.05, 0.008, 0.0006, on=0.55 * d, against=-0.0064, of=CHROME)
 
@@ -101,7 +99,7 @@ def papers(m: Maker) -> None:
 @thing(group="office_small", nyu40=PAPER)
 def notebook(m: Maker) -> None:
     """A notebook with a pen on it."""
-    m.box(0.15, 0.014, 0.21, of=plain("notebook", m.any_colour(), 0.6))
+    m.box(0.15, 0.014, 0.21, of=m.coloured("notebook", 0.6))
     # The pages exceed the cover by up to 1 mm, except at the spine.
     m.box(0.1485, (0.003, 0.011), 0.212, x=0.00125, of=plain("pages", (0.9, 0.89, 0.84), 0.9))
     # A pen 14 cm long is made along x about the origin, and then turned.
@@ -114,7 +112,7 @@ def notebook(m: Maker) -> None:
 @thing(group="office_small")
 def pen_pot(m: Maker) -> None:
     """A pot with pens."""
-    m.vessel([(0, 0), (0.04, 0), (0.04, 0.1)], 0.003, of=plain("pot", m.any_colour(), 0.5))
+    m.vessel([(0, 0), (0.04, 0), (0.04, 0.1)], 0.003, of=m.coloured("pot", 0.5))
     # Up to six pens lean outwards round the pot, each 0.1 to 0.17 rad off the vertical.
     for k in range(m.integers(3, 7)):
         angle = 2 * pi * k / 6 + m.uniform(-0.2, 0.2)
@@ -159,9 +157,8 @@ def binders(m: Maker) -> None:
 def electronics(m: Maker) -> None:
     """A loudspeaker, a radio, a router, a player with discs, or a games console."""
     form = m.integers(0, 5)
-    shell = m.pick(plain("shell", (0.05, 0.05, 0.053), 0.45),
-        plain("shell", (0.88, 0.88, 0.86), 0.45), plain("shell wood", m.wood, 0.5),
-        plain("shell", m.any_colour(), 0.5))
+    shell = m.pick(plain("shell", (0.05, 0.05, 0.053), 0.45), plain("shell", (0.88, 0.88, 0.86),
+        0.45), plain("shell wood", m.wood, 0.5), m.coloured("shell", 0.5))
     black, mesh = (plain("black plastic", (0.03, 0.03, 0.032), 0.5),
         plain("mesh", (0.12, 0.12, 0.125), 0.9))
     match form:
@@ -170,20 +167,19 @@ def electronics(m: Maker) -> None:
                 m.uniform(0.16, 0.22))
             m.box(w, h, d, 0.004, of=shell)
             for y, r in ((h * 0.34, w * 0.36), (h * 0.76, w * 0.2)):
-                m.cylinder(r, 0, 0.004, n=20, turn=LYING_ALONG_Z, at=(0, y, d / 2 - 0.002), of=mesh)
-                m.revolve([(0, 0), (r * 0.35, 0), (0, r * 0.22)], n=14, turn=LYING_ALONG_Z,
-                    at=(0, y, d / 2 + 0.0018), of=black)
+                m.cylinder(r, 0, 0.004, n=20, front=(0, y, d / 2 - 0.002), of=mesh)
+                m.revolve([(0, 0), (r * 0.35, 0), (0, r * 0.22)], n=14, front=(0, y,
+                    d / 2 + 0.0018), of=black)
         case 1:
             m.name, w, h = "radio", m.uniform(0.22, 0.3), m.uniform(0.13, 0.18)
             m.rounded(w, (0.008, h), 0.1, 0.018, n=3, of=shell)
             m.box(0.024, 0.0085, 0.07, 0.002, left=0.028 - w / 2, mirrored="x", of=black)
-            m.cylinder(h * 0.34, 0, 0.003, n=22, turn=LYING_ALONG_Z, at=(-w / 4, h * 0.52, 0.0495),
-                of=mesh)
+            m.cylinder(h * 0.34, 0, 0.003, n=22, front=(-w / 4, h * 0.52, 0.0495), of=mesh)
             m.box((0.01, w / 2 - 0.03), (h * 0.55, h * 0.78), (0.0495, 0.051),
                 of=plain("scale", (0.85, 0.8, 0.65), 0.4))
             for x in (0.035, w / 2 - 0.045):
-                m.frustum((0.016, 0), (0.014, 0.014), n=14, turn=LYING_ALONG_Z,
-                    at=(x, h * 0.28, 0.0495), of=m.pick(CHROME, black))
+                m.frustum((0.016, 0), (0.014, 0.014), n=14, front=(x, h * 0.28, 0.0495),
+                    of=m.pick(CHROME, black))
             if m.chance(0.5):
                 m.tube([(w / 2 - 0.03, h - 0.01, -0.03), (w / 2 - 0.1, h + 0.2, -0.03)], 0.002, n=5,
                     of=CHROME)
@@ -201,8 +197,7 @@ def electronics(m: Maker) -> None:
             m.box(w, (0.012, 0.09), d, 0.003, of=m.pick(shell, STEEL, BLACK_STEEL))
             m.box((-w * 0.3, w * 0.05), (0.055, 0.08), 0.0008, against=d / 2, of=BLACK_GLASS)
             for x, r in ((w * 0.36, 0.024), (w * 0.2, 0.012), (w * 0.12, 0.012)):
-                m.frustum((r, 0), (r * 0.9, 0.018), n=18, turn=LYING_ALONG_Z,
-                    at=(x, 0.05, d / 2 - 0.001), of=CHROME)
+                m.frustum((r, 0), (r * 0.9, 0.018), n=18, front=(x, 0.05, d / 2 - 0.001), of=CHROME)
             m.cylinder(0.018, 0, 0.0125, n=12, at=(-w / 2 + 0.04, 0, -d / 2 + 0.04), of=black,
                 mirrored="xz")
         case 4:

@@ -26,37 +26,13 @@ from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.core.plugins import marks_in_digest, plugins
 from pbrs_farm.dress.models import GENERATED
 from pbrs_farm.dress.style import Style, style_for
-from pbrs_farm.furnishings.things import (
-    bathroom,
-    beds,
-    bins,
-    chandeliers,
-    fitted,
-    kitchen,
-    lamps,
-    plants,
-    radiators,
-    seating,
-    storage,
-    tables,
-)
-from pbrs_farm.furnishings.things.maker import Family, described_in
+from pbrs_farm.furnishings.things.maker import Family, described_in, modules_of
 
 # The order decides which piece a seed draws.
-_MODULES: Final = (
-    kitchen,
-    bathroom,
-    seating,
-    tables,
-    storage,
-    beds,
-    lamps,
-    radiators,
-    bins,
-    chandeliers,
-    plants,
-    fitted,
-)
+# fmt: off
+_MODULES: Final = ("kitchen", "bathroom", "seating", "tables", "storage", "beds", "lamps", "radiators",
+    "bins", "chandeliers", "plants", "fitted")
+# fmt: on
 
 _WARM: Final = (1.0, 0.79, 0.55)  # linear, of a lamp of about 3000 K
 _FLUX_LM: Final = 1000.0  # of a lamp; homes give it what their rooms need
@@ -85,7 +61,7 @@ def families() -> Mapping[str, Family]:
         if not isinstance(module, ModuleType) or not described_in((module,), Family):
             raise BadInput(plugin.mark, plugin.entry.value, "is not a module with a family in it")
         modules.append(module)
-    return described_in((*_MODULES, *modules), Family)
+    return described_in((*modules_of(__package__, _MODULES), *modules), Family)
 
 
 def is_of_family(piece: Piece) -> bool:

@@ -201,8 +201,7 @@ def _glass_door(m: Maker, look: Look, x: Pair, y: Pair, z: float, opens_left: bo
     """A frame of wood about a pane, 20 mm thick before z."""
     a, b, c, e = x[0] + 0.0015, x[1] - 0.0015, y[0] + 0.0015, y[1] - 0.0015
     r = 0.05
-    with m.of(look.front):
-        m.frame((a, b), (c, e), r, 0.02, 0.0015, against=z)
+    m.frame((a, b), (c, e), r, 0.02, 0.0015, against=z, of=look.front)
     m.box((a + r, b - r), (c + r, e - r), 0.004, against=z + 0.008, of=CLEAR)
     pull(m, "square", b - r / 2 if opens_left else a + r / 2, (c + e) / 2, z + 0.02, False, 0.12,
         look.pull_material)

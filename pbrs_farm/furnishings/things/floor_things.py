@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from numpy import pi
 
-from pbrs_farm.core.frames import LYING_ALONG_X, LYING_ALONG_Z, rotation_y
+from pbrs_farm.core.frames import LYING_ALONG_X, rotation_y
 from pbrs_farm.dress.thing_materials import BLACK_GLASS, STEEL, plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.geometry.bodies import bevelled
@@ -45,7 +45,7 @@ def power_strip(m: Maker) -> None:
 @thing(group="toy", called="building_blocks")
 def toy_blocks(m: Maker) -> None:
     """Blocks, balls and a car where a child left them."""
-    colours = [plain("toy", m.any_colour(), 0.5) for _ in range(2)]
+    colours = [m.coloured("toy", 0.5) for _ in range(2)]
     colours += [plain("toy wood", (0.8, 0.62, 0.4), 0.6), plain("toy red", (0.75, 0.14, 0.12), 0.4)]
     colours += [plain("toy blue", (0.12, 0.3, 0.62), 0.4),
         plain("toy yellow", (0.9, 0.72, 0.15), 0.4)]
@@ -86,14 +86,14 @@ def computer_tower(m: Maker) -> None:
         m.box(w - 0.04, 0.035, 0.0015, on=h - 0.075, against=z, of=STEEL)
     for k in range(m.integers(5, 10)):
         m.box(w - 0.06, 0.006, 0.002, on=0.07 + 0.014 * k, against=z, of=case)
-    m.cylinder(0.009, 0.0, 0.003, n=12, turn=LYING_ALONG_Z, at=(0.0, h - 0.1, z), of=STEEL)
+    m.cylinder(0.009, 0.0, 0.003, n=12, front=(0.0, h - 0.1, z), of=STEEL)
 
 
 @thing(group="mat", called="rolled_mat")
 def rolled_mat(m: Maker) -> None:
     """A rolled-up exercise mat with a strap round it."""
     r, long = m.uniform(0.055, 0.08), m.uniform(0.55, 0.65)
-    mat = plain("mat foam", m.any_colour(), 0.9)
+    mat = m.coloured("mat foam", 0.9)
     m.revolve([(0.0, 0.0), (0.35 * r, 0.004), (0.4 * r, 0.0), (0.7 * r, 0.003), (0.75 * r, 0.0),
         (r, 0.0), (r, long), (0.0, long)], n=24, turn=LYING_ALONG_X, at=(-long / 2, r, 0.0), of=mat)
     for x in (-0.25, 0.25):

@@ -51,18 +51,16 @@ def groceries(m: Maker) -> None:
             for k in range(m.integers(1, 4)):
                 h = m.uniform(0.22, 0.31)
                 m.box(0.19, h, 0.06, 0.001, turn=rotation_y(m.uniform(-0.1, 0.1)),
-                    at=(0, 0, -0.075 * k), of=plain("packet", m.any_colour(), 0.5))
+                    at=(0, 0, -0.075 * k), of=m.coloured("packet", 0.5))
                 if k == 0:
-                    m.box(0.14, (0.4 * h, 0.8 * h), (0.03, 0.0306),
-                        of=plain("print", m.any_colour(), 0.5))
+                    m.box(0.14, (0.4 * h, 0.8 * h), (0.03, 0.0306), of=m.coloured("print", 0.5))
         case 4:  # tins
             for k in range(m.integers(2, 6)):
                 with m.moved(at=(0.08 * (k % 2), 0.1105 * (k // 4), 0.08 * (k // 2 % 2))):
                     m.revolve([(0, 0), (0.035, 0), (0.037, 0.003), (0.035, 0.006), (0.035, 0.104),
                         (0.037, 0.107), (0.035, 0.11), (0, 0.108)],
                         of=plain("tin", (0.72, 0.72, 0.72), 0.3))
-                    m.revolve([(0.0345, 0.008), (0.0356, 0.008), (0.0356, 0.102), (0.0345, 0.102),
-                        (0.0345, 0.008)], of=plain("label", m.any_colour(), 0.5))
+                    m.ring((0.0345, 0.0356), (0.008, 0.102), of=m.coloured("label", 0.5))
         case 5:  # eggs
             m.box(0.15, 0.035, 0.1, 0.006, of=plain("pulp", (0.6, 0.58, 0.54), 0.95))
             for x, z in product((-0.048, 0.0, 0.048), (-0.024, 0.024)):

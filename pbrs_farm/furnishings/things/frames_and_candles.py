@@ -7,7 +7,7 @@ from itertools import product
 from numpy import pi
 
 from pbrs_farm.core.classes import PICTURE
-from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_y
+from pbrs_farm.core.frames import rotation_x, rotation_y
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import mix
 from pbrs_farm.dress.thing_materials import glass, plain
@@ -24,7 +24,7 @@ def table_frame(m: Maker) -> None:
     w, h = sorted((m.uniform(0.11, 0.24), m.uniform(0.11, 0.24)))
     w, h = (h, w) if m.chance(0.4) else (w, h)
     material = m.pick(plain("frame", m.wood, 0.4), plain("frame", (0.1, 0.1, 0.1), 0.35),
-        plain("frame", (0.9, 0.9, 0.88), 0.4), m.metal, plain("frame", m.any_colour(), 0.4))
+        plain("frame", (0.9, 0.9, 0.88), 0.4), m.metal, m.coloured("frame", 0.4))
     match form:
         case 0 | 1:  # without or with a mat
             leaning_frame(m, w, h, m.uniform(0.01, 0.028), 0.015, material,
@@ -40,8 +40,8 @@ def table_frame(m: Maker) -> None:
             r = m.uniform(0.06, 0.1)
             with m.moved(turn=rotation_x(-0.17), at=(0, r, 0)):
                 m.tube(ring_path(r, n=28), 0.011, turn=rotation_x(pi / 2), of=material)
-                m.cylinder(r * 0.98, 0, 0.004, n=28, turn=LYING_ALONG_Z, at=(0, 0, -0.003),
-                    of=plain("mount", (0.9, 0.89, 0.85), 0.8))
+                m.cylinder(r * 0.98, 0, 0.004, n=28, front=(0, 0, -0.003), of=plain("mount", (0.9,
+                    0.89, 0.85), 0.8))
                 photo_head(m, r * 1.1, 0.0015)
             m.box(0.024, r * 1.2, (-0.003, 0), turn=rotation_x(0.42), at=(0, 0, -r * 0.62),
                 of=material)
@@ -100,17 +100,17 @@ def photo(m: Maker, low: Pair, high: Pair) -> None:
             c, r = x + (k - (n - 1) / 2) * 0.32 * w, 0.15 * min(w, h)
             m.box(3 * r, (y + b, y + 0.38 * h), (0.0057, 0.006), x=c,
                 of=plain("photo", mix(m.colour_within(0.05, 0.8), (0.4, 0.38, 0.36), 0.4), 0.3))
-            m.cylinder(r, 0, 0.0004, n=14, turn=LYING_ALONG_Z,
-                at=(c, y + 0.38 * h + 0.9 * r, 0.0061), of=plain("photo",
-                m.pick((0.85, 0.66, 0.54), (0.6, 0.42, 0.3), (0.35, 0.23, 0.16)), 0.3))
+            m.cylinder(r, 0, 0.0004, n=14, front=(c, y + 0.38 * h + 0.9 * r, 0.0061),
+                of=plain("photo", m.pick((0.85, 0.66, 0.54), (0.6, 0.42, 0.3), (0.35, 0.23, 0.16)),
+                0.3))
 
 
 def photo_head(m: Maker, w: float, z: float) -> None:
     """A head and its hair, w of the picture across, before z."""
-    m.cylinder(0.42 * w, 0, 0.0004, n=20, turn=LYING_ALONG_Z, at=(0, 0, z),
-        of=plain("photo", mix(m.colour_within(0.2, 0.85), (0.6, 0.58, 0.55), 0.5), 0.3))
-    m.cylinder(0.15 * w, 0, 0.0004, n=14, turn=LYING_ALONG_Z, at=(0, 0.05 * w, z + 0.0008),
-        of=plain("photo", (0.75, 0.56, 0.44), 0.3))
+    m.cylinder(0.42 * w, 0, 0.0004, n=20, front=(0, 0, z), of=plain("photo",
+        mix(m.colour_within(0.2, 0.85), (0.6, 0.58, 0.55), 0.5), 0.3))
+    m.cylinder(0.15 * w, 0, 0.0004, n=14, front=(0, 0.05 * w, z + 0.0008), of=plain("photo", (0.75,
+        0.56, 0.44), 0.3))
     m.box(0.4 * w, w / 5, 0.0003, on=-0.3 * w, against=z + 0.0008,
         of=plain("photo", m.colour_within(0.1, 0.7), 0.3))
 
@@ -123,7 +123,7 @@ def candle(m: Maker) -> None:
     """
     form = m.weighted(0.24, 0.16, 0.14, 0.14, 0.12, 0.08, 0.12)
     wax = plain("wax", mix((0.92, 0.88, 0.78), m.style.accent, m.pick(0.0, 0.0, 0.8)), 0.45)
-    stick = m.pick(m.metal, plain("stick", m.any_colour(), 0.4), plain("stick wood", m.wood, 0.5))
+    stick = m.pick(m.metal, m.coloured("stick", 0.4), plain("stick wood", m.wood, 0.5))
     match form:
         case 0:  # pillars
             x = 0.0

@@ -118,7 +118,7 @@ def _tumbler(m: Maker) -> None:
     extra = m.weighted(0.6, 0.12, 0.12, 0.16)
     if extra == 1:
         m.tube([(-0.3 * r, 0.3 * tall, 0.0), (0.75 * r, 1.0 * tall, 0.0),
-            (1.3 * r, 1.35 * tall, 0.004)], 0.003, n=6, of=plain("straw", m.any_colour(), 0.5))
+            (1.3 * r, 1.35 * tall, 0.004)], 0.003, n=6, of=m.coloured("straw", 0.5))
     elif extra == 2:
         rim = shape[-1][0] * r
         m.cylinder(0.62 * r, 0.0, 0.004, turn=rotation_x(np.pi / 2), at=(rim, tall + 0.12 * r, 0.0),

@@ -15,7 +15,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import CABINET, CLOTHES, MIRROR, PAPER, SHELVES, WHITEBOARD
-from pbrs_farm.core.frames import LYING_ALONG_X, LYING_ALONG_Z, rotation_z
+from pbrs_farm.core.frames import LYING_ALONG_X, rotation_z
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.dress.style import Rgb, mix, shade
 from pbrs_farm.dress.thing_materials import MIRROR_GLASS, plain
@@ -166,14 +166,14 @@ def pan(m: Maker, x: float, y: float) -> None:
     """A pan that hangs from (x, y), its inside to the front."""
     r, low, black = m.uniform(0.08, 0.1), y - 0.13, plain("pan", (0.07, 0.07, 0.075), 0.4)
     m.box(0.018, (low - 0.004, y - 0.024), (0.028, 0.046), x=x, of=black)
-    m.turned([(0.85 * r, 0.0), (r, 0.035), (0.96 * r, 0.035), (0.82 * r, 0.005)], n=24,
-        turn=LYING_ALONG_Z, at=(x, low - r, 0.008), of=black if m.chance(0.6) else m.metal)
+    m.turned([(0.85 * r, 0.0), (r, 0.035), (0.96 * r, 0.035), (0.82 * r, 0.005)], n=24, front=(x,
+        low - r, 0.008), of=black if m.chance(0.6) else m.metal)
 
 
 def hung_cup(m: Maker, x: float, y: float) -> None:
     """A cup that hangs by its handle, its mouth to the side."""
     r, h = 0.038, 0.085
-    with m.of(plain("hung cup", m.any_colour(), 0.25)):
+    with m.of(m.coloured("hung cup", 0.25)):
         m.box(0.036, 0.024, 0.01, x=x, on=y - 0.05, z=0.045)
         m.turned([(r, 0.0), (r, h), (r - 0.004, h), (r - 0.004, 0.004)], n=18, turn=LYING_ALONG_X,
             at=(x - h / 2, y - 0.03 - 0.018 - r, 0.045))
@@ -292,8 +292,7 @@ def pin_board(m: Maker, width: float, height: float, frame: Material) -> None:
                 high = y + h / 2 - 0.018 - 0.018 * k
                 m.box(0.73 * w, (high - 0.003, high), (0.0108, 0.0111), left=x - 0.38 * w,
                     of=plain("print", (0.45, 0.45, 0.47), 0.8))
-            m.box(0.01, 0.01, (0.0108, 0.016), x=x, on=y + h / 2 - 0.012,
-                of=plain("pin", m.any_colour(), 0.3))
+            m.box(0.01, 0.01, (0.0108, 0.016), x=x, on=y + h / 2 - 0.012, of=m.coloured("pin", 0.3))
 
 
 @thing(group="notes", nyu40=PAPER, place=Place.WALL)

@@ -308,9 +308,8 @@ def hob_top(m: Maker, w: float, d: float, y: float, z: float, kind: str,
             ring = glossy("ring", (0.3, 0.3, 0.31), 0.3)
             for x, c, r in ((-0.24, -0.22, 0.09), (0.24, -0.22, 0.075), (-0.24, 0.22, 0.075),
                 (0.24, 0.22, 0.1)):
-                m.revolve([(r * 0.97, y + 0.0055), (r, y + 0.0055), (r, y + 0.0065),
-                    (r * 0.97, y + 0.0065), (r * 0.97, y + 0.0055)], n=28,
-                    at=(x * w, 0.0, z + c * d), of=ring)
+                m.ring((r * 0.97, r), (y + 0.0055, y + 0.0065), n=28, at=(x * w, 0.0, z + c * d),
+                    of=ring)
         case "plates":
             m.board(w, d, y, y + 0.008, 0.015, 0.003, z=z, of=material)
             for x, c, r in ((-0.24, -0.22, 0.09), (0.24, -0.22, 0.073), (-0.24, 0.22, 0.073),
@@ -382,7 +381,7 @@ def oven_front(m: Maker, x: Pair, y: Pair, z: float, panel_h: float, material: M
     if has_knobs:
         for k in range(n):
             m.revolve([(0.0, 0.0), (0.02, 0.0), (0.018, 0.01), (0.016, 0.024), (0.0, 0.025)], n=14,
-                turn=LYING_ALONG_Z, at=(a + w * (k + 0.5) / n, d - panel_h / 2, z + 0.019), of=knob)
+                front=(a + w * (k + 0.5) / n, d - panel_h / 2, z + 0.019), of=knob)
         if m.chance(0.4):
             m.box(0.1, 0.03, 0.0008, x=a / 2 + b / 2, on=d - panel_h / 2 - 0.015,
                 against=z + 0.0199, of=BLACK_GLASS)
@@ -514,8 +513,8 @@ def dishwasher_front(m: Maker, k: KitchenSet, x: Pair, y: float, f: float, p: Di
         pull(m, p.pull, 0.0, top - 0.04, f + 0.019, True, m.pick(0.42, 0.5), p.pull_material)
     clock(m, -0.75 * hw if p.pull == "pocket" else 0.0, middle, front)
     for i in range(p.keys):
-        m.turned([(0.009, 0.0), (0.009, 0.002), (0.007, 0.0035)], n=12, turn=LYING_ALONG_Z,
-            at=(hw - 0.03 - i * 0.027, middle, front), of=p.key_material)
+        m.turned([(0.009, 0.0), (0.009, 0.002), (0.007, 0.0035)], n=12,
+            front=(hw - 0.03 - i * 0.027, middle, front), of=p.key_material)
     m.box(0.05, 0.005, 0.0008, x=0.0, on=low + 0.05, against=front, of=CHROME)
     for i in range(8):  # air for drying
         m.box(0.03, 0.003, 0.0006, left=-hw + 0.04, on=low + 0.03 + 0.007 * i, against=front,
@@ -689,8 +688,8 @@ def fridge_fittings(m: Maker, p: Fridge, x: float, y: Pair, z: float) -> None:
         at = x + m.uniform(-0.12, 0.12), y[0] + (y[1] - y[0]) * m.uniform(0.5, 0.86)
         m.box(wide, high, 0.0006, x=at[0], on=at[1], against=z + 0.0014 * m.integers(0, 6),
             of=plain("note", m.pick((0.93, 0.92, 0.88), m.any_colour()), 0.9))
-        m.turned([(0.012, 0.0), (0.012, 0.003), (0.01, 0.005)], n=12, turn=LYING_ALONG_Z,
-            at=(at[0], at[1] + high - 0.012, z + 0.0078), of=plain("magnet", m.any_colour(), 0.4))
+        m.turned([(0.012, 0.0), (0.012, 0.003), (0.01, 0.005)], n=12, front=(at[0],
+            at[1] + high - 0.012, z + 0.0078), of=m.coloured("magnet", 0.4))
 
 
 def fridge_space(m: Maker, x: Pair, y: Pair, z: Pair, material: Material, r: float,
@@ -769,7 +768,7 @@ def washing_machine(m: Maker, size: Size) -> None:
     m.add(holed_plate((-hw, hw), (foot, h - 0.03), (f - 0.012, f), (x, y), r - 0.05), of=material)
     drum = min(0.24, hw - 0.03, y - foot - 0.02, h - 0.05 - y)
     m.vessel([(0.0, 0.0), (drum, 0.0), (drum, d - 0.12), (r - 0.052, d - 0.09)], 0.004, n=36,
-        turn=LYING_ALONG_Z, at=(x, y, f - 0.003 - (d - 0.09)), of=STEEL)
+        front=(x, y, f - 0.003 - (d - 0.09)), of=STEEL)
     # Counterweights, above the drum behind the drawer and below the drum.
     with m.of(plain("concrete", (0.5, 0.5, 0.5), 0.9)):
         m.box(0.42, (y + drum + 0.015, y + drum + 0.115), (0.03 - d / 2, 0.21 - d / 2))
@@ -790,9 +789,8 @@ def washing_machine(m: Maker, size: Size) -> None:
             of=material)
         drawer_box(m, (-hw + 0.01, -hw + 0.19), (drawer_y[0] - 0.01, drawer_y[1] + 0.02),
             (f - 0.22, f + 0.0115), material)
-    m.revolve([(0.0, 0.0), (0.028, 0.0), (0.026, 0.014), (0.0, 0.016)], n=20, turn=LYING_ALONG_Z,
-        at=(m.pick(0.0, 0.06, 0.22 * w), h - 0.03 - strip / 2, f + 0.012),
-        of=m.pick(CHROME, material, RUBBER))
+    m.revolve([(0.0, 0.0), (0.028, 0.0), (0.026, 0.014), (0.0, 0.016)], n=20, front=(m.pick(0.0,
+        0.06, 0.22 * w), h - 0.03 - strip / 2, f + 0.012), of=m.pick(CHROME, material, RUBBER))
     m.box(0.1, 0.036, 0.0009, left=hw - 0.2, on=h - 0.03 - strip / 2 - 0.018, against=f + 0.0119,
         of=BLACK_GLASS)
     for k in range(m.pick(2, 3, 4)):

@@ -9,7 +9,7 @@ from numpy import cos, pi, sin
 
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import LAMP
-from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_z
+from pbrs_farm.core.frames import rotation_x, rotation_z
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.thing_materials import (
     BLACK_STEEL,
@@ -97,8 +97,7 @@ def standing_lamp(m: Maker, size: Size, p: FloorLamp) -> None:
                 m.board(w, d, 0.0, 0.03, p.corner_m, 0.004)
                 m.rod(0.0, (0.031, h - 0.02), 0.0, q, n=24, of=OPAL)
                 for y in (0.03, 0.36 * h, 0.68 * h, h - 0.022):
-                    m.revolve([(q - 0.002, y), (q + 0.012, y), (q + 0.012, y + 0.022),
-                        (q - 0.002, y + 0.022), (q - 0.002, y)], n=24)
+                    m.ring((q - 0.002, q + 0.012), (y, y + 0.022), n=24)
             case "ball":
                 m.turned([(r, 0.0), (r, 0.012), (0.014, 0.024), (0.01, h - 0.24)], n=28)
                 m.sphere((0.0, h - 0.13, 0.0), 0.13, n=20, of=OPAL)
@@ -159,7 +158,7 @@ def draw_table_lamp(m: Maker, size: Size) -> TableLamp:
     """Draw a table lamp's parameters."""
     w, _d, h = size
     material = m.pick(m.china(), m.china(), m.metal, BRASS, BLACK_STEEL, m.timber,
-        glass((0.8, 0.9, 0.88), 0.25), plain("clay", m.any_colour(), 0.7))
+        glass((0.8, 0.9, 0.88), 0.25), m.coloured("clay", 0.7))
     fabric = shade_fabric(m)
     form = ("shade", "ball", "mushroom")[m.weighted(0.64, 0.18, 0.18)]
     tall, taper = h * m.uniform(0.38, 0.5), m.uniform(0.55, 1.0)
@@ -304,8 +303,7 @@ def flat_lamp(m: Maker, size: Size, material: Material, fabric: Material) -> Non
         case 4:  # a drum of glass in a rim
             m.cylinder(0.06, h - 0.02, h, n=20, of=material)
             m.cylinder(r * 0.9, 0.02, h - 0.021, n=32, of=OPAL)
-            m.revolve([(r * 0.9, 0.0), (r, 0.0), (r, h - 0.01), (r * 0.9, h - 0.01),
-                (r * 0.9, 0.0)], n=32, of=material)
+            m.ring((r * 0.9, r), (0.0, h - 0.01), n=32, of=material)
 
 
 def hung_lamp(m: Maker, size: Size, material: Material, fabric: Material) -> None:
@@ -447,8 +445,8 @@ def sconce(m: Maker, size: Size) -> None:
         case 1:  # a ball on an arm
             r = min(0.4 * h, d / 2 - 0.01, hw)
             if w < h:
-                m.revolve([(0.0, 0.0), (hw, 0.0), (hw, 0.012), (0.0, 0.018)], n=24,
-                    turn=LYING_ALONG_Z, at=(0.0, h - hw, 0.0), of=material)
+                m.revolve([(0.0, 0.0), (hw, 0.0), (hw, 0.012), (0.0, 0.018)], n=24, front=(0.0,
+                    h - hw, 0.0), of=material)
             m.box(w, h, (0.0, 0.01), 0.003, of=material)
             m.rod(0.0, h / 2, (0.01, d - r), 0.012, of=material)
             m.sphere((0.0, h / 2, d - r), r, n=18, of=OPAL)

@@ -25,6 +25,7 @@ from collections import Counter
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
+from importlib import import_module
 from itertools import product
 from types import ModuleType
 from typing import Any, Concatenate, Generic, ParamSpec, TypeVar
@@ -35,7 +36,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import OTHERPROP
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.frames import affine
+from pbrs_farm.core.frames import LYING_ALONG_Z, affine
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.dress.models import Model, Part, hanging_piece, standing_piece, transformed
@@ -134,6 +135,10 @@ class Maker(Shapes):
         """A colour for a small item: of the style, calm or loud, or any at all."""
         return any_colour(self.rng, self.style)
 
+    def coloured(self, name: str, roughness: float) -> Material:
+        """A plain material of any colour."""
+        return plain(name, self.any_colour(), roughness)
+
     def colour_within(self, low: float, high: float) -> Rgb:
         """A colour whose channels lie between low and high (sRGB, 0..1)."""
         r, g, b = (float(v) for v in self.rng.uniform(low, high, 3))
@@ -161,18 +166,21 @@ class Maker(Shapes):
         of: Material | None = None,
         at: Triple | None = None,
         turn: F64 | None = None,
+        front: Triple | None = None,
         name: str = "",
         mirrored: str = "",
     ) -> None:
         """Add a solid to the item.
 
         of: its material; by default that of the nearest enclosing `with m.of(...)`. turn: a
-        rotation (3, 3) about the origin. at: the position of its origin after that, metres. name:
-        of its surface, for later searches. mirrored: "x", "z" or "xz" adds copies at the mirrored
+        rotation (3, 3) about the origin. at: the position of its origin after that, metres. front: the
+        same of a solid whose top is turned to the front, +z. name: of its surface, for later searches. mirrored: "x", "z" or "xz" adds copies at the mirrored
         positions.
         """
         if name:
             solid = replace(solid, name=name)
+        if front is not None:
+            at, turn = front, LYING_ALONG_Z
         if at is None and turn is None:
             self._parts.append((solid, of))
             return
@@ -368,6 +376,11 @@ def family(
         )
 
     return described
+
+
+def modules_of(package: str, names: Iterable[str]) -> Iterator[ModuleType]:
+    """The modules of a package by name."""
+    return (import_module(f"{package}.{name}") for name in names)
 
 
 def described_in(modules: Iterable[ModuleType], kind: type[D]) -> dict[str, D]:

@@ -8,7 +8,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy import cos, pi, sin
 
-from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_y, rotation_z
+from pbrs_farm.core.frames import rotation_x, rotation_y, rotation_z
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import shade
 from pbrs_farm.dress.thing_materials import glass, plain
@@ -45,8 +45,7 @@ def bird(m: Maker, s: float, look: Look) -> None:
         m.ellipsoid((0.035 * s, 0.032 * s, 0.055 * s), n=14, turn=rotation_x(-0.35),
             at=(0, 0.062 * s, 0))
         m.sphere((0, 0.1 * s, 0.038 * s), 0.022 * s, n=12)
-        m.revolve([(0, 0), (0.007 * s, 0), (0, 0.024 * s)], n=8, turn=LYING_ALONG_Z,
-            at=(0, 0.1 * s, 0.055 * s))
+        m.revolve([(0, 0), (0.007 * s, 0), (0, 0.024 * s)], n=8, front=(0, 0.1 * s, 0.055 * s))
         m.ellipsoid((0.014 * s, 0.006 * s, 0.045 * s), n=10, turn=rotation_x(0.5),
             at=(0, 0.05 * s, -0.06 * s))
     m.turned([(0.03 * s, 0), (0.028 * s, 0.006), (0.006, 0.01), (0.005, 0.04 * s)], n=14,
@@ -145,7 +144,7 @@ def arch(m: Maker, _s: float, look: Look) -> None:
     for k in range(m.integers(1, 4)):
         m.tube(bent([(-w / 2 + k * 0.022, 0, 0), (-w / 2 + k * 0.022, w - k * 0.022, 0),
             (w / 2 - k * 0.022, w - k * 0.022, 0), (w / 2 - k * 0.022, 0, 0)], w / 2 - k * 0.022,
-            n=7), 0.009, of=plain("arch", m.any_colour(), 0.6))
+            n=7), 0.009, of=m.coloured("arch", 0.6))
 
 
 def wooden_tree(m: Maker, s: float, look: Look) -> None:
@@ -191,7 +190,7 @@ def camera(m: Maker, _s: float, look: Look) -> None:
     m.box(0.13, (0.05, 0.072), 0.03, 0.004, of=m.metal)
     m.box(0.04, (0.07, 0.085), 0.024, 0.003, of=m.metal)
     m.turned([(0.027, 0), (0.027, 0.02), (0.024, 0.021), (0.024, 0.035), (0.018, 0.036),
-        (0.014, 0.028)], n=20, turn=LYING_ALONG_Z, at=(0.005, 0.034, 0.0155), of=black)
+        (0.014, 0.028)], n=20, front=(0.005, 0.034, 0.0155), of=black)
     m.cylinder(0.009, 0, 0.007, n=12, at=(-0.045, 0.0715, 0), of=m.metal, mirrored="x")
 
 
@@ -293,7 +292,7 @@ def blocks(m: Maker, s: float, look: Look) -> None:
     for _ in range(m.integers(2, 5)):
         w, h, d = m.uniform(0.04, 0.09), m.uniform(0.02, 0.06), m.uniform(0.03, 0.06)
         m.box(w, h, d, 0.003, on=y, turn=rotation_y(m.uniform(-0.3, 0.3)),
-            of=m.pick(look.grain, look.material, plain("ornament", m.any_colour(), 0.5)))
+            of=m.pick(look.grain, look.material, m.coloured("ornament", 0.5)))
         y += h + 0.0002
 
 

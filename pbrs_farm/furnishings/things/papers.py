@@ -25,14 +25,13 @@ def printed(m: Maker, w: float, h: float, z: float, ground: Material) -> None:
     m.box(w, h, 0.0004, on=-h / 2, against=z, of=ground)
     top, edge = h / 2 - 0.08 * h, 0.1 * w
     if m.chance(0.5):
-        m.add(slab((-w / 2 + edge, top - 0.08 * h, z + 0.0004),
-            (m.uniform(0.0, 0.4) * w, top, z + 0.0006)), of=m.pick(_INK,
-            plain("print", m.any_colour(), 0.7)))
+        m.add(slab((-w / 2 + edge, top - 0.08 * h, z + 0.0004), (m.uniform(0.0, 0.4) * w, top,
+            z + 0.0006)), of=m.pick(_INK, m.coloured("print", 0.7)))
         top -= 0.14 * h
     if m.chance(0.5):
         high = m.uniform(0.25, 0.45) * h
         m.box(w - 2 * edge, (top - high, top), 0.0002, against=z + 0.0004,
-            of=plain("print", m.any_colour(), 0.7))
+            of=m.coloured("print", 0.7))
         top -= high + 0.06 * h
     while top > -h / 2 + 0.12 * h:
         m.add(slab((-w / 2 + edge, top - 0.022 * h, z + 0.0004),
@@ -45,7 +44,7 @@ def standing_card(m: Maker) -> None:
     """One to three open cards or brochures, upright like a book or like a tent."""
     for k in range(m.pick(1, 1, 2, 3)):
         w, h = m.pick((0.105, 0.148), (0.148, 0.105), (0.1, 0.21), (0.148, 0.21), (0.12, 0.17))
-        ground = white_paper(m) if m.chance(0.5) else plain("card", m.any_colour(), 0.5)
+        ground = white_paper(m) if m.chance(0.5) else m.coloured("card", 0.5)
         x, turn = 0.0 if k == 0 else 0.17 * k, m.normal(0, 0.25)
         with m.moved(at=(x, 0.0, m.normal(0, 0.015)), turn=rotation_y(turn)):
             if m.chance(0.7):
@@ -66,7 +65,7 @@ def floor_papers(m: Maker) -> None:
     """A few sheets and leaflets that lie where they fell, one over another."""
     for k in range(m.integers(2, 5)):
         w, h = m.pick((0.21, 0.297), (0.21, 0.297), (0.148, 0.21), (0.1, 0.21))
-        ground = white_paper(m) if m.chance(0.6) else plain("leaflet", m.any_colour(), 0.5)
+        ground = white_paper(m) if m.chance(0.6) else m.coloured("leaflet", 0.5)
         with (m.moved(at=(m.normal(0, 0.07), 0.0007 * k, m.normal(0, 0.07)),
             turn=rotation_y(m.uniform(0, 6.28))), m.moved(turn=rotation_x(-pi / 2))):
             printed(m, w, h, 0.0, ground)

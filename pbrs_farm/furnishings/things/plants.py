@@ -61,9 +61,8 @@ def _add_leaf(m: Maker, at: Triple, around: float, up: float, grid: F64, of: Mat
 def pot(m: Maker, w: float, d: float, tall: float) -> None:
     """A pot w by d and its earth, one of eight forms."""
     r = w / 2
-    material = m.pick(m.china(), plain("terracotta", (0.66, 0.38, 0.26), 0.85),
-        plain("pot", m.any_colour(), 0.6), plain("stone pot", (0.55, 0.54, 0.51), 0.85), WICKER,
-        m.metal, m.timber)
+    material = m.pick(m.china(), plain("terracotta", (0.66, 0.38, 0.26), 0.85), m.coloured("pot",
+        0.6), plain("stone pot", (0.55, 0.54, 0.51), 0.85), WICKER, m.metal, m.timber)
     rim, n = max(0.008, 0.05 * r), 18
 
     def turned(profile: Sequence[tuple[float, float]]) -> None:

@@ -6,7 +6,7 @@ from numpy import pi
 
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import OTHERFURNITURE
-from pbrs_farm.core.frames import LYING_ALONG_X, LYING_ALONG_Z, rotation_z
+from pbrs_farm.core.frames import LYING_ALONG_X, rotation_z
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.thing_materials import CHROME, RUBBER, WHITE_STEEL, glossy, plain
 from pbrs_farm.furnishings.things.maker import Maker, Size, family, thing
@@ -23,7 +23,7 @@ def towel_radiator(m: Maker) -> None:
         for x in (-(w / 2 - 0.015), w / 2 - 0.015):
             m.cylinder(0.015, 0.0, h, n=12, at=(x, 0.0, 0.06))
             for y in (0.1, h - 0.1):
-                m.cylinder(0.008, 0.0, 0.048, n=10, turn=LYING_ALONG_Z, at=(x, y, 0.0))
+                m.cylinder(0.008, 0.0, 0.048, n=10, front=(x, y, 0.0))
         # Five tubes, then room for a towel.
         y = 0.05
         while y < h - 0.03:

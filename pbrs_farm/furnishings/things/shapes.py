@@ -45,6 +45,7 @@ class PutBox(TypedDict, total=False):
 class Put(PutBox, total=False):
     """How any other solid is added: the keywords of `Maker.add`."""
 
+    front: Triple | None
     mirrored: str
 
 
@@ -58,6 +59,7 @@ class Shapes:
         of: Material | None = None,
         at: Triple | None = None,
         turn: F64 | None = None,
+        front: Triple | None = None,
         name: str = "",
         mirrored: str = "",
     ) -> None:
@@ -246,6 +248,11 @@ class Shapes:
     ) -> None:
         """A solid through outlines at heights; sharp: degrees of turning that make an edge."""
         self.add(bodies.loft(rings, sharp=sharp), **put)
+
+    def ring(self, r: Pair, y: Pair, *, n: int = 16, **put: Unpack[Put]) -> None:
+        """A ring of rectangular section between two radii and two heights."""
+        (a, b), (low, high) = r, y
+        self.revolve([(a, low), (b, low), (b, high), (a, high), (a, low)], n=n, **put)
 
     def hoop(self, outline: Outline, y: float, r: float, *, n: int = 6, **put: Unpack[Put]) -> None:
         """A ring of round section along an outline at height y."""

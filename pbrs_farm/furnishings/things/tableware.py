@@ -6,7 +6,7 @@ from collections.abc import Callable
 from itertools import product
 
 from pbrs_farm.core.classes import PAPER
-from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_x, rotation_y, rotation_z
+from pbrs_farm.core.frames import rotation_x, rotation_y, rotation_z
 from pbrs_farm.dress.thing_materials import STEEL, plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.geometry.bodies import bevelled
@@ -70,8 +70,8 @@ def pile(m: Maker, n: int) -> None:
                     m.turned([(x * r, y) for x, y in _ROUND[form]], n=sides)
     if form in (0, 2, 3, 4) and m.chance(0.35):
         top = 0.0066 * (n - 1) + max(y for _x, y in _ROUND[form])
-        m.hoop(oval(1.975 * r, 1.975 * r, n=28), top - 0.001, 0.0012, n=5, of=plain("china band",
-            m.any_colour(), 0.2))
+        m.hoop(oval(1.975 * r, 1.975 * r, n=28), top - 0.001, 0.0012, n=5,
+            of=m.coloured("china band", 0.2))
     # Some have a spoon, a fork or crumbs on them.
     if n == 1 and m.chance(0.25):
         m.tube([(-0.5 * r, 0.012, 0.01), (0.6 * r, 0.026, 0.0)], 0.0025, n=5, of=m.metal)
@@ -102,10 +102,9 @@ def pot(m: Maker) -> None:
     r = m.uniform(0.09, 0.13)
     tall = r * m.uniform(0.8, 1.2)
     # Body, rim, the lid's dome and its knob in one closed profile.
-    m.revolve([(0, 0), (r * 0.95, 0), (r, 0.01), (r, tall), (r * 1.03, tall),
-        (r * 0.9, tall + 0.012), (r * 0.2, tall + 0.025), (0.012, tall + 0.028),
-        (0.018, tall + 0.045), (0, tall + 0.048)], n=20,
-        of=m.metal if m.chance(0.6) else plain("enamel", m.any_colour(), 0.2))
+    m.revolve([(0, 0), (r * 0.95, 0), (r, 0.01), (r, tall), (r * 1.03, tall), (r * 0.9,
+        tall + 0.012), (r * 0.2, tall + 0.025), (0.012, tall + 0.028), (0.018, tall + 0.045), (0,
+        tall + 0.048)], n=20, of=m.metal if m.chance(0.6) else m.coloured("enamel", 0.2))
     for x in (-1.0, 1.0):
         m.cylinder(0.04, -0.006, 0.006, n=12, at=(x * r, tall * 0.8, 0),
             of=plain("grip", (0.08, 0.08, 0.08), 0.4))
@@ -118,8 +117,7 @@ def pan(m: Maker) -> None:
     m.vessel([(0, 0), (r * 0.85, 0), (r, 0.045)], 0.003, n=20, of=black)
     # The handle is along +z, turned a little.
     with m.moved(turn=rotation_y(m.uniform(-0.5, 0.5))), m.of(black):
-        m.turned([(0.011, 0.0), (0.009, 0.1), (0.012, 0.18)], n=8, turn=LYING_ALONG_Z,
-            at=(0, 0.035, r * 0.97))
+        m.turned([(0.011, 0.0), (0.009, 0.1), (0.012, 0.18)], n=8, front=(0, 0.035, r * 0.97))
 
 
 @thing(group="kitchen_tool", nyu40=PAPER)
@@ -142,7 +140,7 @@ def cutlery(m: Maker) -> None:
         case 0:  # wooden spoons and ladles lean in a pot
             m.name, r, tall = "utensil_pot", m.uniform(0.045, 0.06), m.uniform(0.13, 0.17)
             m.vessel([(0, 0), (r * 0.92, 0), (r, tall)], 0.004, n=18,
-                of=m.pick(m.china(), STEEL, plain("pot", m.any_colour(), 0.4)))
+                of=m.pick(m.china(), STEEL, m.coloured("pot", 0.4)))
             for k in range(m.integers(3, 6)):
                 with m.moved(turn=rotation_y(1.7 * k + m.uniform(0, 0.6))):
                     material, high = (m.pick(STEEL, plain("spoon wood", m.wood, 0.6),

@@ -7,7 +7,7 @@ from typing import NamedTuple
 
 from numpy import pi
 
-from pbrs_farm.core.frames import LYING_ALONG_Z, rotation_y, rotation_z
+from pbrs_farm.core.frames import rotation_y, rotation_z
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
@@ -31,7 +31,7 @@ def toy(m: Maker) -> None:
     A bear, blocks, a train, a car, stacked rings, a robot, a top, a plane, a rocket, a house, a drum, an animal on wheels.
     """
     form, s = m.integers(0, len(_FORMS)), m.uniform(0.85, 1.2)
-    body, second, third = (plain("toy", m.any_colour(), 0.5) for _ in range(3))
+    body, second, third = (m.coloured("toy", 0.5) for _ in range(3))
     m.name = _FORMS[form].__name__
     _FORMS[form](m, s, Look(body, second, third, plain("toy wood", m.wood, 0.6)))
 
@@ -108,7 +108,7 @@ def robot(m: Maker, s: float, look: Look) -> None:
         m.box(0.02, (0.08, 0.145), 0.024, 0.003, left=-0.062, mirrored="x")
     m.box(0.06, (0.156, 0.205), 0.05, 0.004, of=look.second)
     for x in (-0.013, 0.013):
-        m.cylinder(0.008, 0, 0.004, n=10, turn=LYING_ALONG_Z, at=(x, 0.185, 0.025), of=look.third)
+        m.cylinder(0.008, 0, 0.004, n=10, front=(x, 0.185, 0.025), of=look.third)
     m.rod(0, (0.2, 0.235), 0, 0.003, n=6, of=look.third)
     m.sphere((0, 0.237, 0), 0.007, n=8, of=look.third)
     m.box(0.024, (0.14, 0.157), 0.024, 0.002, of=look.third)
@@ -121,8 +121,7 @@ def plane(m: Maker, s: float, look: Look) -> None:
     m.box(0.26, (0.042, 0.05), (0.0, 0.055), 0.003, of=look.second)
     m.box(0.1, (0.042, 0.048), 0.03, 0.002, against=-0.1, of=look.second)
     m.box(0.006, (0.045, 0.09), 0.035, 0.001, against=-0.105, of=look.third)
-    m.revolve([(0, 0), (0.01, 0), (0, 0.018)], n=10, turn=LYING_ALONG_Z, at=(0, 0.045, 0.089),
-        of=look.third)
+    m.revolve([(0, 0), (0.01, 0), (0, 0.018)], n=10, front=(0, 0.045, 0.089), of=look.third)
     m.box(0.12, (0.041, 0.049), (0.095, 0.099), 0.001, turn=rotation_z(0.3), at=(0.013, 0, 0),
         of=look.grain)
     for x in (-0.035, 0.035):
@@ -141,8 +140,8 @@ def rocket(m: Maker, s: float, look: Look) -> None:
         m.loft([([(0.02, -0.003), (0.02, 0.003), (0.07, 0.003), (0.07, -0.003)], 0.0),
             ([(0.02, -0.003), (0.02, 0.003), (0.045, 0.003), (0.045, -0.003)], 0.08)], sharp=10.0,
             turn=rotation_y(2.0944 * k), of=look.third)
-    m.cylinder(0.013, 0, 0.004, n=12, turn=LYING_ALONG_Z, at=(0, 0.12, 0.0375),
-        of=plain("window", (0.6, 0.8, 0.9), 0.2))
+    m.cylinder(0.013, 0, 0.004, n=12, front=(0, 0.12, 0.0375), of=plain("window", (0.6, 0.8, 0.9),
+        0.2))
 
 
 def doll_house(m: Maker, s: float, look: Look) -> None:
@@ -218,7 +217,7 @@ _FORMS = (bear, toy_blocks, toy_train, toy_car, stacking_rings, robot, plane, ro
 def ball(m: Maker) -> None:
     """A ball: plain, of two colours, with rings, with seams."""
     form, r = m.integers(0, 4), m.uniform(0.05, 0.115)
-    body, second = (plain("ball", m.any_colour(), 0.45), plain("ball",
+    body, second = (m.coloured("ball", 0.45), plain("ball",
         m.pick((0.9, 0.9, 0.88), (0.08, 0.08, 0.09), m.any_colour()), 0.45))
     match form:
         case 0:  # plain
