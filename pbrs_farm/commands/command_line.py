@@ -64,6 +64,8 @@ class _ArgumentRow(NamedTuple):
         text = self.help.format_map(_PHRASES)
         if self.type == "flag":
             return {"action": "store_true", "help": text}
+        if self.type == "switch":
+            return {"action": argparse.BooleanOptionalAction, "help": text}
         kind = _TYPES[self.type]
         words: dict[str, Any] = {"type": kind, "metavar": self.metavar or None, "help": text}
         if self.choices:

@@ -25,13 +25,13 @@ def add_verbs(verb: Verb) -> None:
     verb("train", _train)
     p = verb("evaluate", _evaluate)
     p.usage = (
-        "%(prog)s RUN [--on PLACE] [--out DIR] [--predictions DIR] [--views N] [--exact] [--json]\n"
-        "       %(prog)s --task TASK [--on PLACE --out DIR] [--predictions DIR] [--views N] [--exact] [--json]"
+        "%(prog)s RUN [--on PLACE] [--out DIR] [--predictions DIR] [--views N] [--exact] [--[no-]mirror] [--json]\n"
+        "       %(prog)s --task TASK [--on PLACE --out DIR] [--predictions DIR] [--views N] [--exact] [--[no-]mirror] [--json]"
     )
     p = verb("predict", _predict)
     p.usage = (
-        "%(prog)s RUN PHOTO [PHOTO ...] --out DIR [--hfov DEG] [--json]\n"
-        "       %(prog)s --task TASK PHOTO [PHOTO ...] --out DIR [--hfov DEG] [--json]"
+        "%(prog)s RUN PHOTO [PHOTO ...] --out DIR [--hfov DEG] [--[no-]mirror] [--json]\n"
+        "       %(prog)s --task TASK PHOTO [PHOTO ...] --out DIR [--hfov DEG] [--[no-]mirror] [--json]"
     )
     verb("ablation", _ablation)
     verb("compare", _compare)
@@ -207,7 +207,8 @@ def _evaluate(args: argparse.Namespace) -> None:
         most=args.views,
         known_held_out=frozenset(record["homes"]["held_out"]) or None,
     )
-    evaluations = [evaluate(run, place) for place in places]
+    mirror = _is_mirrored(args, run) if places else False
+    evaluations = [evaluate(run, place, mirror=mirror) for place in places]
     for predictions in columns:
         evaluations = _with_column(run, evaluations, predictions)
     rows = report(run, evaluations)
@@ -221,6 +222,15 @@ def _evaluate(args: argparse.Namespace) -> None:
         page = write_evaluation(out, run, evaluations)
         if not args.json:
             echo(str(page))
+
+
+def _is_mirrored(args: argparse.Namespace, run: Trained) -> bool:
+    """--mirror or --no-mirror; by default True if the second pass is cheap."""
+    from pbrs_farm.study.training.prediction import is_mirror_cheap
+
+    if args.mirror is None:
+        return is_mirror_cheap(run.network, run.task, run.plan)
+    return bool(args.mirror)
 
 
 def _check_judged(args: argparse.Namespace) -> None:
@@ -268,7 +278,8 @@ def _predict(args: argparse.Namespace) -> int:
         raise BadInput("--hfov", f"{args.hfov:g}", "this network does not use rays: omit --hfov")
     if args.hfov and not 1 <= args.hfov <= 170:
         raise BadInput("--hfov", f"{args.hfov:g}", "expected degrees, 1 to 170")
-    for row in predict_photographs(trained, files, args.out, args.hfov):
+    mirror = _is_mirrored(args, trained)
+    for row in predict_photographs(trained, files, args.out, args.hfov, mirror=mirror):
         n_failed += "error" in row
         if args.json:
             echo(json.dumps(row))

@@ -46,6 +46,7 @@ class Photo:
     id: str
     rgb: Srgb8Image  # (H, W, 3)
     depth_mm: NDArray[np.uint16]  # (H, W), 0 = unknown
+    room: str = ""  # of NYUv2's scenes
 
 
 @dataclass(frozen=True, slots=True)
@@ -73,8 +74,12 @@ def _names_depth(path: Path) -> bool:
     return match is not None and match[2].lower() == "depth" and path.suffix.lower() in _DEPTH_FILES
 
 
-def pairs_in(folder: Path) -> tuple[PhotoFiles, ...]:
-    """Every pair below folder, by its path; BadInput without one, and for a lone half."""
+def pairs_in(folder: Path, *, raw: bool = False) -> tuple[PhotoFiles, ...]:
+    """Every pair below folder, by its path; BadInput without one, and for a lone half.
+
+    raw: SUN RGB-D's measured depth rather than its filled one.
+    """
+    depth_names = sorted(_DEPTH_NAMES) if raw else _DEPTH_NAMES
     if not folder.is_dir():
         raise BadInput(folder, "", "no such folder")
     pairs: list[PhotoFiles] = []
@@ -90,7 +95,7 @@ def pairs_in(folder: Path) -> tuple[PhotoFiles, ...]:
         # Look for a colour folder beside a depth folder.
         names = {p.name.lower(): p for p in inner.iterdir() if p.is_dir()}
         rgb = next((names[n] for n in _RGB_NAMES if n in names), None)
-        depth = next((names[n] for n in _DEPTH_NAMES if n in names), None)
+        depth = next((names[n] for n in depth_names if n in names), None)
         if rgb is not None and depth is not None:
             pairs += _pairs_of_folders(folder, inner, rgb, depth)
         # Look for pairs by suffix anywhere else.
@@ -229,11 +234,12 @@ class NyuMat:
     """NYUv2's nyu_depth_v2_labeled.mat, read lazily: the file is 2.8 GB.
 
     MATLAB 7.3 is HDF5 with the axes reversed: images (n, 3, 640, 480) uint8 and depths
-    (n, 640, 480) metres. Use as a context manager. Raises BadInput for a truncated file, another
-    MATLAB version, or a file without these two arrays.
+    (n, 640, 480) metres, or with `raw` rawDepths, without filled holes, if the file has them. Use as
+    a context manager. Raises BadInput for a truncated file, another MATLAB version, or a file without
+    these two arrays.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, *, raw: bool = False) -> None:
         h5py = h5py_for_mats()
         self.path = path
         try:
@@ -248,6 +254,8 @@ class NyuMat:
             raise BadInput(path, "", self._open_fault(str(error))) from None
         try:
             self._images, self._depths = self._tables(h5py)
+            has_raw = raw and "rawDepths" in self._file
+            self._stored = self._file["rawDepths"] if has_raw else self._depths
         except BadInput:
             self._file.close()
             raise
@@ -294,10 +302,18 @@ class NyuMat:
             try:
                 # Transpose MATLAB's (channel, column, row).
                 rgb = np.ascontiguousarray(np.asarray(self._images[k]).transpose(2, 1, 0))
-                depth = np.asarray(self._depths[k]).T
-            except (OSError, RuntimeError):
+                depth = np.asarray(self._stored[k]).T
+                room = self._room(k)
+            except (OSError, RuntimeError, ValueError, IndexError):
                 raise BadInput(self.path, place, "cannot be read; the file is damaged") from None
-            yield Photo(f"{k + 1:04d}", rgb, _depth_mm(depth, 1.0, str(self.path), place))
+            yield Photo(f"{k + 1:04d}", rgb, _depth_mm(depth, 1.0, str(self.path), place), room)
+
+    def _room(self, k: int) -> str:
+        """Name of the scene of a picture without the letter of its part, kitchen_0004; "" if unnamed."""
+        if "scenes" not in self._file:
+            return ""
+        letters = np.asarray(self._file[self._file["scenes"][0, k]]).ravel()
+        return "".join(map(chr, letters)).rstrip("abcdefgh")
 
 
 def sha256_of_files(paths: list[Path]) -> str:

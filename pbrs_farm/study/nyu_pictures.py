@@ -1,6 +1,6 @@
 """NYUv2's nyu_depth_v2_labeled.mat: pictures with normals, classes, boundaries. Effects: reads files.
 
-Pictures are cropped as in Eigen et al. Normals are planes fitted to the filled depth; classes need
+Pictures are cropped as in Eigen et al. Normals are planes fitted to the raw depth; classes need
 classMapping40.mat beside the file (894 names to 40, Gupta et al. 2013), and
 splits.mat lists the training (795) and test pictures (654).
 """
@@ -47,12 +47,13 @@ def nyu_pictures(path: Path, plan: TrainingPlan, split: str) -> Iterator[RealFra
     mapping = path.parent / "classMapping40.mat"
     classes = _class_map(mapping) if plan.task == "segmentation" else np.zeros(0, np.uint8)
     is_empty = True
-    with NyuMat(path) as mat:
+    with NyuMat(path, raw=True) as mat:
         for photo in mat.photos(numbers):
             is_empty = False
             truth = _truth(path, int(photo.id) - 1, photo, plan, classes)
             crops = {key: array[_CROP] for key, array in truth.items()}
-            yield cropped_frame(photo.id, photo.rgb[_CROP], crops, moved_origin(_K, *_CROP), plan)
+            K, room = moved_origin(_K, *_CROP), photo.room or photo.id
+            yield cropped_frame(photo.id, photo.rgb[_CROP], crops, K, plan, room=room)
     if is_empty:
         raise BadInput(path, "", f"no {split} picture: splits.mat is of another file")
 

@@ -12,13 +12,14 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.resampling import resized_any, resized_by_area, resized_nearest
 from pbrs_farm.curate.photographs import Photo
-from pbrs_farm.study.plane_normals import normals_of_depth
+from pbrs_farm.study.plane_normals import large_planes, normals_of_depth
+from pbrs_farm.study.tasks.normals_task import NORMAL_SCALE
 from pbrs_farm.study.tasks.study_task import Arrays
 from pbrs_farm.study.training.training_views import CAMERA, ViewArrays, camera_numbers
 from pbrs_farm.study.training_plan import TrainingPlan
 
 PLANE_TRUTH: Final = (
-    "planes fitted to depth in windows of 1/40 of the width; mask: at least 60 % of the window on"
+    "planes fitted to raw depth in windows of 1/40 of the width; mask: at least 60 % of the window on"
     " one surface, within 1 % of its depth, not seen edge-on"
 )
 DEPTH_TRUTH: Final = "the photograph's own depth along the axis, where it has one"
@@ -38,16 +39,34 @@ class RealFrame:
     truth: Arrays  # (H, W, ...) targets of the same crop at the photograph's size
     K: F64  # (3, 3) pixels at the plan's size
     digest: str = ""  # of the picture's file; training pictures are refused as test pictures
+    room: str = ""
 
 
 def cropped_frame(
-    id: str, rgb: NDArray[np.uint8], truth: Arrays, K: F64, plan: TrainingPlan, digest: str = ""
+    id: str,
+    rgb: NDArray[np.uint8],
+    truth: Arrays,
+    K: F64,
+    plan: TrainingPlan,
+    digest: str = "",
+    room: str = "",
 ) -> RealFrame:
     """The frame of a photograph, its truth and its K (3, 3), all of the whole picture."""
     size = plan.width_px, plan.height_px
     colour, rows, columns = crop_to_size(rgb, size)
     crops = {key: array[rows, columns] for key, array in truth.items()}
-    return RealFrame(id, colour, crops, camera_of_crop(K, rows, columns, size), digest)
+    return RealFrame(id, colour, crops, camera_of_crop(K, rows, columns, size), digest, room)
+
+
+def with_large_planes(frame: RealFrame) -> Arrays:
+    """The truth of a frame with "plane" (H, W, 3) int16, the normals of large planes, if it has normals."""
+    if "normal" not in frame.truth:
+        return frame.truth
+    depth, valid = frame.truth["depth"], frame.truth["valid"]
+    (height, width), (small_height, small_width) = depth.shape, frame.colour.shape[:2]
+    K = np.diag([width / small_width, height / small_height, 1.0]) @ frame.K
+    planes = large_planes(depth, frame.truth["normal"] / NORMAL_SCALE, valid, K)
+    return frame.truth | {"plane": np.rint(planes * NORMAL_SCALE).astype(np.int16)}
 
 
 def arrays_of_frames(frames: Iterable[RealFrame], plan: TrainingPlan) -> ViewArrays:
@@ -72,7 +91,7 @@ def photo_truth(photo: Photo, K: F64, plan: TrainingPlan) -> Arrays:
     if plan.task == "depth":
         return depth
     normal, valid = normals_of_depth(depth_m, K)
-    return {"normal": np.rint(normal * 32767).astype(np.int16), "valid": valid, **depth}
+    return {"normal": np.rint(normal * NORMAL_SCALE).astype(np.int16), "valid": valid, **depth}
 
 
 def crop_to_size(

@@ -2,7 +2,7 @@
 
 A folder has pairs in a layout of docs/selection.md and the camera: intrinsics.json with fx, fy, cx,
 cy in pixels (depth_scale: units per metre), or intrinsics.txt with those four numbers or the nine of
-K, beside the pictures or in a folder above. The truth of normals is planes fitted to depth.
+K, beside the pictures or in a folder above. Normals are planes fitted to raw depth.
 
 ScanNet: <scene>/{color,depth,label}/NAME and the 4 x 4 matrix of the depth camera as written by its
 tools; depth in mm, labels in NYU40 ids. SUN RGB-D: <scene>/{image,depth,depth_bfx}, intrinsics.txt,
@@ -14,7 +14,9 @@ camera.
 from __future__ import annotations
 
 import json
+import re
 from dataclasses import dataclass
+from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
@@ -44,6 +46,8 @@ _FILES: Final = (
     "intrinsics/intrinsic_depth.txt",
 )
 _LABELS: Final = "label"  # ScanNet's folder of classes, beside the pictures
+_SCAN: Final = re.compile(r"(scene\d{4})_\d\d\b.*")  # of ScanNet
+_FRAME: Final = re.compile(r"_rgbf\d+.*")  # of SUN RGB-D's videos
 _OF_SUN_RGBD: Final = ("extrinsics", "depth_bfx", "seg.mat")  # beside image/ and intrinsics.txt
 
 
@@ -62,7 +66,7 @@ class PhotoCamera:
 
 def real_pairs(folder: Path, plan: TrainingPlan) -> tuple[PhotoFiles, ...]:
     """Pairs with truth of the plan's task (classes: ScanNet's labels, SUN RGB-D's toolbox); BadInput."""
-    pairs = pairs_in(folder)
+    pairs = pairs_in(folder, raw=True)
     if plan.task == "segmentation":
         pairs = tuple(pair for pair in pairs if has_labels_of(pair))
     if plan.task not in ("normals", "depth", "segmentation") or not pairs:
@@ -83,7 +87,35 @@ def read_frame(pair: PhotoFiles, folder: Path, plan: TrainingPlan) -> RealFrame:
     else:
         truth = photo_truth(photo, camera.matrix(), plan)
     K, digest = camera.matrix(), digest_of_picture(pair)
-    return cropped_frame(pair.id, photo.rgb, truth, K, plan, digest)
+    return cropped_frame(pair.id, photo.rgb, truth, K, plan, digest, room_of(pair, folder))
+
+
+def room_of(pair: PhotoFiles, folder: Path) -> str:
+    """Room of a pair: by rooms.json, else its folder; scans of a ScanNet scene and frames of a SUN RGB-D video are one."""
+    rooms = _rooms_of(folder)
+    place = pair.id.rpartition("/")[0]
+    if known := [rooms[name] for name in (pair.id, place) if name in rooms]:
+        return known[0]
+    if _is_of_sun_rgbd(pair):
+        # A folder has one picture; those of a video differ by the frame's number, Sun3D's by their folder.
+        return place if "sun3ddata" in place.split("/") else _FRAME.sub("", pair.id)
+    return _SCAN.sub(r"\1", place)
+
+
+@lru_cache(maxsize=4)
+def _rooms_of(folder: Path) -> dict[str, str]:
+    """Content of rooms.json: room by picture or folder; BadInput for another form."""
+    path = folder / "rooms.json"
+    if not path.is_file():
+        return {}
+    try:
+        rows = json.loads(text_given(path))
+    except ValueError:
+        rows = None
+    if not isinstance(rows, dict) or not all(isinstance(room, str) for room in rows.values()):
+        hint = '{"kitchen_morning": "kitchen", "kitchen_evening": "kitchen"}'
+        raise BadInput(path, "", "expected the room of each folder", hint=hint)
+    return rows
 
 
 def digest_of_picture(pair: PhotoFiles) -> str:

@@ -58,6 +58,22 @@ def test_pictures_are_cut_to_the_crop_and_the_test_split(task: str, mat: Path) -
         assert (np.nonzero(prediction.any(0))[0] == 279).all()
 
 
+def test_raw_depth_judges_and_parts_of_a_scene_are_one_room(mat: Path) -> None:
+    with h5py.File(mat, "a") as file:
+        raw = np.full((3, 640, 480), 2.5, np.float32)
+        raw[:, 300:320] = 0
+        file["rawDepths"] = raw
+        names = ("kitchen_0004a", "bath_0001", "kitchen_0004b")
+        letters = [np.frombuffer(name.encode(), np.uint8).astype(np.uint16) for name in names]
+        refs = [file.create_dataset(f"#refs#/{k}", data=x[:, None]) for k, x in enumerate(letters)]
+        table = file.create_dataset("scenes", (1, 3), h5py.ref_dtype)
+        table[0] = [row.ref for row in refs]
+    views = open_judged_place(str(mat), small_plan("depth"), mode="mlt_il_ol")
+    assert views.rooms == ("kitchen_0004", "kitchen_0004")
+    depth = views.truths[0]["depth"]
+    assert (depth == 0).mean() == pytest.approx(20 / depth.shape[1])
+
+
 @pytest.mark.parametrize("task", ["normals", "segmentation", "boundaries", "depth"])
 def test_its_train_split_trains_and_its_test_split_is_held_out(task: str, mat: Path) -> None:
     plan, source = small_plan(task), TrainingSource((str(mat),))

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from pbrs_farm.study.metrics.angular import angles_deg
-from pbrs_farm.study.plane_normals import normals_of_depth
+from pbrs_farm.study.plane_normals import large_planes, normals_of_depth, smoothed_normals
 
 pytestmark = pytest.mark.study
 
@@ -60,3 +60,35 @@ def test_unknown_or_rough_depth_is_not_trusted() -> None:
     assert not trusted[40:80, 40:80].any()
     assert trusted[:, 126:154].mean() < 0.1
     assert (normal[~trusted] == 0).all()
+
+
+def test_large_planes_are_found_through_noise_and_leave_small_ones_out() -> None:
+    planes = np.array([[0, -0.94, -0.34], [0.6, 0, -0.8], [0, 0, -1.0]])
+    depths = np.stack([_depth_of_plane(n, d) for n, d in zip(planes, (1.2, 2.5, 1.5), strict=True)])
+    depths = np.where(depths > 0, depths, 99)
+    nearest = depths[:2].argmin(0)
+    nearest[20:35, 40:60] = (
+        2  # a picture frame of 1.6 % of the pixels, half a metre before the wall
+    )
+    depth = np.take_along_axis(depths, nearest[None], 0)[0]
+    noisy = 1 / (1 / depth + np.random.default_rng(0).normal(0, 0.0018, depth.shape))
+    normal, valid = normals_of_depth(noisy, K)
+    fitted = large_planes(noisy, normal, valid, K)
+    is_on = fitted.any(-1)
+    # Beside the crease, pixels are near both planes.
+    assert (angles_deg(fitted[is_on], planes[nearest][is_on]) < 0.1).mean() > 0.97
+    assert angles_deg(normal[valid], planes[nearest][valid]).mean() > 5, "the windows are noisy"
+    assert not is_on[22:33, 42:58].any()
+    assert all(is_on[nearest == k].mean() > 0.6 for k in (0, 1))
+    assert not large_planes(noisy, normal, np.zeros_like(valid), K).any()
+
+
+def test_smoothed_normals_are_means_of_a_square() -> None:
+    normal = np.random.default_rng(0).normal(size=(30, 40, 3))
+    valid = np.random.default_rng(1).random((30, 40)) > 0.3
+    smooth = smoothed_normals(normal, valid, radius=0.05)
+    square = (slice(8, 13), slice(18, 23))
+    mean = normal[square][valid[square]].sum(0)
+    np.testing.assert_allclose(smooth[10, 20], mean / np.linalg.norm(mean), atol=1e-6)
+    corner = normal[:3, :3][valid[:3, :3]].sum(0)
+    np.testing.assert_allclose(smooth[0, 0], corner / np.linalg.norm(corner), atol=1e-6)

@@ -17,6 +17,7 @@ from pbrs_farm.study.judging.evaluation import (
     Trained,
     evaluation_text,
     notes,
+    over_rooms_of,
     predictions_of,
     report,
 )
@@ -59,18 +60,19 @@ def _set(run: Trained, evaluation: Evaluation) -> dict[str, Any]:
     # Predict again rather than keep all predictions in memory.
     cards = {
         k: _card(task, evaluation, k, prediction)
-        for k, prediction in enumerate(predictions_of(run, views))
+        for k, prediction in enumerate(predictions_of(run, views, mirror=evaluation.mirror))
         if k in worst or k in best
     }
-    rows = [
-        (name, [shown_figure(f, judged.figures[f]) for f in task.figures])
-        for name, judged in evaluation.rows.items()
-    ]
+    over_rooms = over_rooms_of(task)
+    rows = []
+    for name, judged in evaluation.rows.items():
+        figures = judged.figures | {over_rooms: evaluation.over_rooms(name)}
+        rows.append((name, [shown_figure(f, figures[f]) for f in (over_rooms, *task.figures)]))
     return {
         "name": views.name,
         "n": len(views.ids),
         "credits": list(dict.fromkeys(views.credits)),
-        "titles": [title_of(figure) for figure in task.figures],
+        "titles": [title_of(figure) for figure in (over_rooms, *task.figures)],
         "rows": rows,
         "worst": [cards[k] for k in worst],
         "best": [cards[k] for k in best],

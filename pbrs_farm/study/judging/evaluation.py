@@ -6,9 +6,9 @@ import hashlib
 import math
 import statistics
 from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,23 +17,34 @@ from torch import nn
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_nearest
-from pbrs_farm.study.judging.figure_text import is_underfit, markdown, shown_figure, title_of
+from pbrs_farm.study.judging.figure_text import (
+    PLANES,
+    is_underfit,
+    markdown,
+    shown_figure,
+    title_of,
+)
 from pbrs_farm.study.judging.paper_figures import PaperRow, paper_row, tuned_row
 from pbrs_farm.study.metrics.edge_scores import EXACT_THRESHOLDS
 from pbrs_farm.study.metrics.error_parts import PARTS, ErrorParts
 from pbrs_farm.study.networks.initial_weights import has_hed, start_from
 from pbrs_farm.study.networks.network_choice import network_of
+from pbrs_farm.study.plane_normals import smoothed_normals
 from pbrs_farm.study.tasks.edges_task import N_THRESHOLDS, EdgesTask
 from pbrs_farm.study.tasks.study_task import Arrays, StudyTask
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.checkpoint import load_checkpoint
-from pbrs_farm.study.training.prediction import Judged, move_to_device, predict, score_predictions
+from pbrs_farm.study.training.prediction import Judged, move_to_device, predict
 from pbrs_farm.study.training.run_folder import RunFolder, finished_run
 from pbrs_farm.study.training.training_views import ViewArrays
 from pbrs_farm.study.training.view_sources import NYU_LIGHT
 from pbrs_farm.study.training_plan import TrainingPlan, plan_of
 
 _HED_ROW = "HED untouched"
+FLOOR: Final = "floor of the truth"
+"""Row of the truth judged as a prediction: smoothed, and on large planes as measured."""
+LARGE_PLANES: Final = ", large planes"
+"""End of the names of rows judged by the normals of large planes."""
 _LEAST_GROUPS = 3  # minimum number of homes for an interval
 
 
@@ -48,12 +59,23 @@ class JudgedViews:
     truths: tuple[Arrays, ...]  # targets (H, W, ...) of each view at any size
     credits: tuple[str, ...] = ()  # of the homes in the pictures
     cameras: F32 | None = None  # (N, 4) fx, fy, cx, cy of each picture, of plans with `rays`
+    rooms: tuple[str, ...] = ()  # room of each photograph
 
     @property
     def sizes(self) -> list[tuple[int, int]]:
         """(height, width) of each truth; photographs differ in size."""
         shapes = [next(iter(truth.values())).shape for truth in self.truths]
         return [(int(shape[0]), int(shape[1])) for shape in shapes]
+
+    @property
+    def plane_truths(self) -> tuple[Arrays, ...]:
+        """The truths with the normals of large planes, of photographs."""
+        if "plane" not in self.truths[0]:
+            return ()
+        return tuple(
+            truth | {"normal": truth["plane"], "valid": truth["plane"].any(-1)}
+            for truth in self.truths
+        )
 
 
 def judged_of_arrays(
@@ -86,17 +108,32 @@ class Evaluation:
     """Figures of predictions for a set of test views."""
 
     views: JudgedViews
-    rows: dict[str, Judged]  # "network", the baseline's name, HED untouched
+    rows: dict[str, Judged]  # "network", the baseline's name, HED untouched, FLOOR
     parts: dict[str, ErrorParts] = field(default_factory=dict)  # of normals, by the names of rows
+    mirror: bool = False  # the network's predictions are means with those of mirrored pictures
 
     @property
     def groups(self) -> dict[str, float]:
-        """Mean error of the network by home, or by folder of photographs."""
+        """Mean error of the network by home, or by room of photographs."""
+        return self.groups_of("network")
+
+    def groups_of(self, name: str) -> dict[str, float]:
+        """Mean error of a row by home, or by room of photographs."""
         by_group: dict[str, list[float]] = {}
-        for view, error in zip(self.views.ids, self.rows["network"].errors, strict=True):
+        groups = self.views.rooms or [view.rpartition("/")[0] for view in self.views.ids]
+        for group, error in zip(groups, self.rows[name].errors, strict=True):
             if math.isfinite(error):
-                by_group.setdefault(view.rpartition("/")[0], []).append(error)
+                by_group.setdefault(group, []).append(error)
         return {group: statistics.fmean(errors) for group, errors in sorted(by_group.items())}
+
+    def over_rooms(self, name: str) -> float:
+        """Mean of a row over homes or rooms; NaN without truth."""
+        return statistics.fmean(self.groups_of(name).values() or [math.nan])
+
+    def share_of_pixels(self, name: str) -> float | None:
+        """Share of the pixels that a row counts; None for tasks without a mask."""
+        n = self.rows[name].figures.get("n_pixels") if name in self.rows else None
+        return None if n is None else n / sum(height * width for height, width in self.views.sizes)
 
     def as_json(self) -> dict[str, Any]:
         """Figures, each group's mean error, and each view's own."""
@@ -104,7 +141,11 @@ class Evaluation:
             "on": self.views.name,
             "truth": self.views.truth,
             "n_views": len(self.views.ids),
+            "mirror": self.mirror,
+            "measured": self.share_of_pixels("network"),
+            "on_large_planes": self.share_of_pixels("network" + LARGE_PLANES),
             "figures": {name: judged.figures for name, judged in self.rows.items()},
+            "over_rooms": {name: self.over_rooms(name) for name in self.rows},
             "parts": {name: parts.means_deg() for name, parts in self.parts.items()},
             "shares": next(iter(self.parts.values())).shares() if self.parts else {},
             "groups": self.groups,
@@ -155,20 +196,34 @@ def check_exact(task_name: str, *, exact: bool) -> None:
         raise BadInput("--exact", "", f"{task_name} has no thresholds: of boundaries alone")
 
 
-def predictions_of(run: Trained, views: JudgedViews) -> Iterator[NDArray[Any]]:
+def predictions_of(
+    run: Trained, views: JudgedViews, *, mirror: bool = False
+) -> Iterator[NDArray[Any]]:
     """A prediction of each view in order, at the size of its truth."""
-    return predict(run.network, views.colour, run.task, run.plan, views.sizes, views.cameras)
+    network, task, plan = run.network, run.task, run.plan
+    return predict(network, views.colour, task, plan, views.sizes, views.cameras, mirror=mirror)
 
 
-def evaluate(run: Trained, views: JudgedViews) -> Evaluation:
-    """Score the network, the baseline and, for boundaries if its weights are installed, HED."""
+def evaluate(run: Trained, views: JudgedViews, *, mirror: bool = False) -> Evaluation:
+    """Score the network, the baseline, the truth of photographs, and HED if its weights are installed.
+
+    mirror: average the network's predictions with those of the mirrored pictures.
+    """
     constant = (resized_nearest(run.baseline, width, height) for height, width in views.sizes)
-    rows = {"network": predictions_of(run, views), run.figures["baseline_name"]: constant}
+    rows = {
+        "network": predictions_of(run, views, mirror=mirror),
+        run.figures["baseline_name"]: constant,
+    }
     if run.task.name == "boundaries" and has_hed():
         rows[_HED_ROW] = _untouched_hed(run, views)
-    evaluation = Evaluation(views, {})
+    evaluation = Evaluation(views, {}, mirror=mirror)
     for name, predictions in rows.items():
         evaluation = _with_row(run, evaluation, name, predictions)
+    if planes := views.plane_truths:
+        smooth = (smoothed_normals(truth["normal"], truth["valid"]) for truth in views.truths)
+        evaluation = _judged_by(run, evaluation, smooth, {FLOOR: views.truths})
+        measured = (truth["normal"] for truth in views.truths)
+        evaluation = _judged_by(run, evaluation, measured, {FLOOR + LARGE_PLANES: planes})
     return evaluation
 
 
@@ -184,21 +239,30 @@ def with_others(
 def _with_row(
     run: Trained, evaluation: Evaluation, name: str, predictions: Iterable[NDArray[Any]]
 ) -> Evaluation:
-    views, parts = evaluation.views, dict(evaluation.parts)
-    if run.task.name == "normals":
-        parts[name] = ErrorParts()
-        predictions = _counted(predictions, views, parts[name])
-    judged = score_predictions(predictions, views.truths, run.task, run.plan)
-    return Evaluation(views, evaluation.rows | {name: judged}, parts)
+    views = evaluation.views
+    planes = {name + LARGE_PLANES: views.plane_truths} if views.plane_truths else {}
+    return _judged_by(run, evaluation, predictions, {name: views.truths, **planes})
 
 
-def _counted(
-    predictions: Iterable[NDArray[Any]], views: JudgedViews, parts: ErrorParts
-) -> Iterator[NDArray[Any]]:
-    """The same predictions, each added to parts on the way."""
-    for prediction, truth, colour in zip(predictions, views.truths, views.colour, strict=True):
-        parts.add(prediction, truth, colour)
-        yield prediction
+def _judged_by(
+    run: Trained,
+    evaluation: Evaluation,
+    predictions: Iterable[NDArray[Any]],
+    truths: dict[str, tuple[Arrays, ...]],
+) -> Evaluation:
+    """The evaluation with a row of the same predictions by each of the truths, by name."""
+    scorers = {name: run.task.scorer(run.plan) for name in truths}
+    errors: dict[str, list[float]] = {name: [] for name in truths}
+    parts = {name: ErrorParts() for name in truths if run.task.name == "normals"}
+    for k, (prediction, colour) in enumerate(
+        zip(predictions, evaluation.views.colour, strict=True)
+    ):
+        for name, rows in truths.items():
+            errors[name].append(scorers[name].add(prediction, rows[k]))
+            if name in parts:
+                parts[name].add(prediction, rows[k], colour)
+    judged = {name: Judged(scorers[name].figures(), tuple(errors[name])) for name in truths}
+    return replace(evaluation, rows=evaluation.rows | judged, parts=evaluation.parts | parts)
 
 
 def _untouched_hed(run: Trained, views: JudgedViews) -> Iterator[NDArray[Any]]:
@@ -213,26 +277,40 @@ def _untouched_hed(run: Trained, views: JudgedViews) -> Iterator[NDArray[Any]]:
 
 def figures_table(run: Trained, evaluations: list[Evaluation]) -> str:
     """Figures of training homes, held-out homes and test sets side by side, as Markdown."""
-    paper = _paper(run)
+    paper, task = _paper(run), run.task
     columns: list[tuple[str, dict[str, float]]] = []
     for title, network, baseline in trained_columns(run):
         columns += [(title, network), (run.figures["baseline_name"], baseline)]
     for evaluation in evaluations:
         first = f"{evaluation.views.name} ({len(evaluation.views.ids)})"
-        for name, judged in evaluation.rows.items():
-            columns.append((first if name == "network" else name, judged.figures))
-    rows = []
-    for k, figure in enumerate(run.task.figures):
-        cells = [shown_figure(figure, figures[figure]) for _, figures in columns]
-        if paper:
-            published = paper.figures[k] if k < len(paper.figures) else None
-            cells.append(shown_figure(figure, published))
-        rows.append([title_of(figure), *cells])
-    titles = ["", *(title for title, _ in columns)]
+        columns += [
+            (first if name == "network" else name, figures_of_row(task, evaluation, name))
+            for name in evaluation.rows
+            if not name.endswith(LARGE_PLANES)
+        ]
     if paper:
         tuned = f", then {paper.tuned}" if paper.tuned else ""
-        titles.append(f"paper: {paper.pretrained}{tuned}, on NYUv2")
-    return markdown(titles, rows)
+        published = dict(zip(task.figures, paper.figures, strict=False))
+        columns.append((f"paper: {paper.pretrained}{tuned}, on NYUv2", published))
+    names = (*task.figures, over_rooms_of(task), *(PLANES + name for name in task.figures))
+    rows = [
+        [title_of(name), *(shown_figure(name, figures.get(name)) for _, figures in columns)]
+        for name in names
+        if any(name in figures for _, figures in columns)
+    ]
+    return markdown(["", *(title for title, _ in columns)], rows)
+
+
+def over_rooms_of(task: StudyTask) -> str:
+    """Name of the figure of the mean error over homes or rooms."""
+    return "over_rooms_deg" if task.name == "normals" else "over_rooms"
+
+
+def figures_of_row(task: StudyTask, evaluation: Evaluation, name: str) -> dict[str, float]:
+    """Figures of a row, its mean over rooms, and those by large planes."""
+    figures = evaluation.rows[name].figures | {over_rooms_of(task): evaluation.over_rooms(name)}
+    planes = evaluation.rows.get(name + LARGE_PLANES)
+    return figures | ({PLANES + k: v for k, v in planes.figures.items()} if planes else {})
 
 
 def trained_columns(run: Trained) -> list[tuple[str, dict[str, float], dict[str, float]]]:
@@ -246,25 +324,22 @@ def trained_columns(run: Trained) -> list[tuple[str, dict[str, float], dict[str,
     ]
 
 
-def parts_tables(evaluations: list[Evaluation]) -> str:
-    """Tables of the mean angle by kind of surface, depth and luma; "" for other tasks."""
+def parts_tables(evaluations: Iterable[dict[str, Any]]) -> str:
+    """Tables of the mean angle by kind of surface, depth and luma of rows of JSON; "" for other tasks."""
     tables = []
-    for evaluation in evaluations:
-        means = {name: parts.means_deg() for name, parts in evaluation.parts.items()}
-        if not means:
-            continue
-        shares = next(iter(evaluation.parts.values())).shares()
+    for row in evaluations:
+        means = row["parts"]
         rows = [
             [
                 part,
-                f"{100 * shares[part]:.1f} %",
-                *(shown_figure("mean_deg", row[part]) for row in means.values()),
+                f"{100 * row['shares'][part]:.1f} %",
+                *(shown_figure("mean_deg", column.get(part)) for column in means.values()),
             ]
             for part in PARTS
-            if all(part in row for row in means.values())
+            if any(part in column for column in means.values())
         ]
-        titles = [f"{evaluation.views.name}: mean, degrees", "pixels", *means]
-        tables.append(markdown(titles, rows))
+        if rows:
+            tables.append(markdown([f"{row['on']}: mean, degrees", "pixels", *means], rows))
     return "\n\n".join(tables)
 
 
@@ -296,27 +371,40 @@ def notes(run: Trained, evaluations: list[Evaluation]) -> list[str]:
         text = f"thresholds: {N_THRESHOLDS} of training and held-out homes"
         lines.append(text + f", {run.task.n_thresholds} of all else" * bool(evaluations))
     for evaluation in evaluations:
-        lines.append(f"truth of {evaluation.views.name}: {evaluation.views.truth}")
+        shares = {
+            " % of the pixels measured": evaluation.share_of_pixels("network"),
+            " % on large planes": evaluation.share_of_pixels("network" + LARGE_PLANES),
+        }
+        texts = [
+            f"; {100 * share:.0f}{what}" for what, share in shares.items() if share is not None
+        ]
+        lines.append(f"truth of {evaluation.views.name}: {evaluation.views.truth}{''.join(texts)}")
         lines += _interval_of_groups(run.task, evaluation)
+    if any(evaluation.mirror for evaluation in evaluations):
+        text = "averaged with those of the mirrored pictures; of training and held-out homes they are not"
+        lines.append(f"predictions of --on are {text}")
+    if any(FLOOR in evaluation.rows for evaluation in evaluations):
+        text = "the truth judged as a prediction, smoothed, and on large planes as measured"
+        lines.append(f"{FLOOR}, which no network goes below: {text}")
     if _paper(run):
         lines.append("the paper's numbers are of other pictures, another truth and 568,793 views")
     return lines
 
 
 def _interval_of_groups(task: StudyTask, evaluation: Evaluation) -> list[str]:
-    """The mean over homes or folders with its interval, if there are enough."""
+    """The mean over homes or rooms with its interval, if there are enough."""
     groups = list(evaluation.groups.values())
     if len(groups) < _LEAST_GROUPS:
         return []
     scale, unit = task.error_scale, task.error_unit
     mean, low, high = (scale * x for x in (statistics.fmean(groups), *mean_interval(groups)))
-    place = f"{evaluation.views.name}, over its {len(groups)} homes or folders: {task.error_name}"
+    place = f"{evaluation.views.name}, over its {len(groups)} homes or rooms: {task.error_name}"
     return [f"{place}, mean {mean:.1f}{unit}, 90 % within {low:.1f} to {high:.1f}"]
 
 
 def evaluation_text(run: Trained, evaluations: list[Evaluation]) -> str:
     """The tables and the notes as Markdown."""
-    parts = parts_tables(evaluations)
+    parts = parts_tables(evaluation.as_json() for evaluation in evaluations)
     tables = [figures_table(run, evaluations), "", *([parts, ""] if parts else [])]
     return "\n".join([*tables, *notes(run, evaluations)])
 

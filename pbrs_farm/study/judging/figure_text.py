@@ -20,13 +20,20 @@ _TITLES: Final = {
     "mean_accuracy": "mean accuracy", "weighted_iou": "f.w. IoU",
     "scale_invariant": "scale-invariant", "abs_rel": "absolute relative",
     "below_1_25": "ratio < 1.25", "rms_m": "RMS, metres",
+    "over_rooms": "error over rooms", "over_rooms_deg": "mean over rooms",
     "ods": "ODS", "ois": "OIS", "ap": "AP", "r50": "R50",
 }
 # fmt: on
 
 
+PLANES: Final = "planes_"
+"""Start of the names of figures by the normals of large planes."""
+
+
 def title_of(figure: str) -> str:
     """Title of a figure in tables."""
+    if figure.startswith(PLANES):
+        return f"large planes: {title_of(figure.removeprefix(PLANES))}"
     return _TITLES[figure]
 
 

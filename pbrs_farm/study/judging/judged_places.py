@@ -13,7 +13,7 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import home_of
 from pbrs_farm.study.judging.evaluation import JudgedViews, judged_of_arrays
 from pbrs_farm.study.nyu_pictures import NYU_HOME, NYU_TRUTHS, has_splits, nyu_pictures
-from pbrs_farm.study.photographs import PHOTO_TRUTHS, RealFrame
+from pbrs_farm.study.photographs import PHOTO_TRUTHS, RealFrame, with_large_planes
 from pbrs_farm.study.real_frames import read_frame, real_pairs
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.prediction import predict, score_predictions
@@ -170,5 +170,6 @@ def _nyu_views(
 def _judged_frames(name: str, truth: str, frames: Sequence[RealFrame]) -> JudgedViews:
     colour = np.stack([frame.colour for frame in frames])
     cameras = np.stack([camera_numbers(frame.K) for frame in frames])
-    ids, truths = tuple(frame.id for frame in frames), tuple(frame.truth for frame in frames)
-    return JudgedViews(name, truth, ids, colour, truths, cameras=cameras)
+    ids, rooms = tuple(frame.id for frame in frames), tuple(frame.room for frame in frames)
+    truths = tuple(with_large_planes(frame) for frame in frames)
+    return JudgedViews(name, truth, ids, colour, truths, cameras=cameras, rooms=rooms)

@@ -130,7 +130,7 @@ def network_size(height: int, width: int, n_pixels: int) -> tuple[int, int]:
 
 
 def predict_photographs(
-    run: Trained, files: Sequence[Path], out: Path, hfov_deg: float = 0.0
+    run: Trained, files: Sequence[Path], out: Path, hfov_deg: float = 0.0, *, mirror: bool = False
 ) -> Iterator[dict[str, Any]]:
     """Write predictions of photographs into out, and a page at the end; yields a row per photograph.
 
@@ -138,15 +138,15 @@ def predict_photographs(
     described in docs/formats/layers.md: NAME_normal.png (16 bits), NAME_semantic.png or
     NAME_nyu13.png (ids), NAME_depth.png (mm) or NAME_edges.png (255 x strength); NAME_shown.png is a
     picture of it. hfov_deg: horizontal field of view of all photographs, for a network with rays; 0 =
-    as each file says. Rows of such networks have "hfov_deg" and "camera", its source. Raises BadInput
-    if out is not writable.
+    as each file says. Rows of such networks have "hfov_deg" and "camera", its source. mirror: average
+    with the predictions of the mirrored pictures. Raises BadInput if out is not writable.
     """
     make_folder(out)
     rows: list[dict[str, Any]] = []
     for batch in _batches(run, files):
         began = time.perf_counter()
         photographs = [item for item in batch if isinstance(item, Photograph)]
-        done = _predicted_rows(run, photographs, out, hfov_deg)
+        done = _predicted_rows(run, photographs, out, hfov_deg, mirror=mirror)
         batch_rows = [next(done) if isinstance(item, Photograph) else item for item in batch]
         seconds = (time.perf_counter() - began) / max(len(photographs), 1)
         for row in batch_rows:
@@ -199,7 +199,7 @@ def _size(run: Trained, photograph: Photograph) -> tuple[int, int]:
 
 
 def _predicted_rows(
-    run: Trained, photographs: Sequence[Photograph], out: Path, hfov_deg: float
+    run: Trained, photographs: Sequence[Photograph], out: Path, hfov_deg: float, *, mirror: bool
 ) -> Iterator[dict[str, Any]]:
     """Write the predictions of photographs of one network size; their rows."""
     if not photographs:
@@ -214,9 +214,9 @@ def _predicted_rows(
         facts = [_camera_facts(p, *c) for p, c in zip(photographs, cameras, strict=True)]
         factors = np.array([[width / w, height / h] * 2 for h, w in sizes])
         scaled = (np.stack([K for K, _ in cameras]) * factors).astype(np.float32)
-    predictions = predict(run.network, small, run.task, run.plan, sizes, scaled)
+    predictions = predict(run.network, small, run.task, run.plan, sizes, scaled, mirror=mirror)
     for photograph, prediction, row in zip(photographs, predictions, facts, strict=True):
-        yield _written(run, photograph, prediction, out) | row
+        yield _written(run, photograph, prediction, out) | row | {"mirror": mirror}
 
 
 def _camera_facts(photograph: Photograph, camera: F64, source: str) -> dict[str, Any]:

@@ -61,6 +61,10 @@ class ClassesTask(StudyTask):
     def loss(self, output: Tensor, batch: Batch, plan: TrainingPlan) -> Tensor:
         return class_loss(output, batch["labels"], over=plan.loss_over)
 
+    def mirror_mean(self, output: Tensor, mirrored: Tensor) -> Tensor:
+        """Mean probability of each class."""
+        return (output.softmax(1) + mirrored.softmax(1)) / 2
+
     def predictions(self, output: Tensor) -> NDArray[Any]:
         """(B, H, W) uint8 ids of the highest score; channel 0 is class 1."""
         return np.asarray((output.argmax(1) + 1).byte().numpy(force=True))

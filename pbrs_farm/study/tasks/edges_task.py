@@ -47,6 +47,10 @@ class EdgesTask(StudyTask):
     def loss(self, output: Tensor, batch: Batch, plan: TrainingPlan) -> Tensor:
         return edge_loss(output, batch["edges"], as_sum=plan.edge_sum)
 
+    def mirror_mean(self, output: Tensor, mirrored: Tensor) -> Tensor:
+        """Score of the mean probability."""
+        return torch.logit((output.sigmoid() + mirrored.sigmoid()) / 2, eps=1e-6)
+
     def predictions(self, output: Tensor) -> NDArray[Any]:
         """(B, H, W) float32 strengths 0..1."""
         output = output.float()

@@ -19,7 +19,7 @@ from pbrs_farm.study.tasks.study_task import Arrays, Batch, StudyTask, TaskScore
 from pbrs_farm.study.training_plan import TrainingPlan
 from pbrs_farm.views.view_sample import Sample
 
-_SCALE: Final = 32767  # int16 value of a component of 1
+NORMAL_SCALE: Final = 32767  # int16 value of a component of 1
 _WORST_DEG: Final = 60.0  # angle that an error map shows as 1
 _OPENGL_FROM_OPENCV: Final = OPENCV_FROM_OPENGL[:3, :3]  # its own inverse
 _PUBLISHED_FROM_OPENCV: Final = PUBLISHED_FROM_OPENGL @ _OPENGL_FROM_OPENCV
@@ -54,11 +54,11 @@ class NormalsTask(StudyTask):
         if sample.normal is None or sample.valid is None:
             raise BadInput(sample.id, "normal", "the view has no normals")
         depth = {} if sample.depth is None else {"depth": sample.depth}
-        normal = np.rint(sample.normal * _SCALE).astype(np.int16)
+        normal = np.rint(sample.normal * NORMAL_SCALE).astype(np.int16)
         return {"normal": normal, "valid": sample.valid, **depth}
 
     def loss(self, output: Tensor, batch: Batch, plan: TrainingPlan) -> Tensor:
-        normal = batch["normal"].permute(0, 3, 1, 2).float() / _SCALE
+        normal = batch["normal"].permute(0, 3, 1, 2).float() / NORMAL_SCALE
         return normal_loss(output, normal, batch["valid"], kind=plan.loss, over=plan.loss_over)
 
     def mirrored(self, batch: Batch, flips: Tensor) -> Batch:
@@ -71,6 +71,11 @@ class NormalsTask(StudyTask):
     def turned(self, batch: Batch, rotation: Tensor) -> Batch:
         normal = torch.einsum("bij,bhwj->bhwi", rotation, batch["normal"].float())
         return batch | {"normal": normal.round().to(batch["normal"].dtype)}
+
+    def mirror_mean(self, output: Tensor, mirrored: Tensor) -> Tensor:
+        """Sum of the unit vectors; x of the mirrored picture changes its sign."""
+        plain, other = (functional.normalize(x, dim=1, eps=1e-6) for x in (output, mirrored))
+        return plain + other * other.new_tensor([-1, 1, 1]).view(1, 3, 1, 1)
 
     def predictions(self, output: Tensor) -> NDArray[Any]:
         """(B, H, W, 3) float32 unit vectors."""
@@ -110,7 +115,7 @@ class NormalsTask(StudyTask):
         return np.where(has_normal, np.rint((normal + 1) * 127.5), 0).astype(np.uint8)
 
     def prediction_of(self, truth: Arrays) -> NDArray[Any]:
-        return np.where(truth["valid"][..., None], truth["normal"] / np.float32(_SCALE), 0)
+        return np.where(truth["valid"][..., None], truth["normal"] / np.float32(NORMAL_SCALE), 0)
 
     def file_kind(self, plan: TrainingPlan) -> str:
         return "normal"

@@ -66,6 +66,10 @@ class StudyTask(ABC):
         """The batch with directions rotated by (B, 3, 3), after its pixels were moved."""
         return batch
 
+    def mirror_mean(self, output: Tensor, mirrored: Tensor) -> Tensor:
+        """Mean output of a picture and of its mirrored copy, whose output was flipped back."""
+        return (output + mirrored) / 2
+
     @abstractmethod
     def predictions(self, output: Tensor) -> NDArray[Any]:
         """(B, H, W, ...) predictions from the network's output."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import time
 import warnings
 from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import dataclass
@@ -19,12 +20,13 @@ from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.installation import install_command
 from pbrs_farm.study.networks.network_choice import encode_colour
-from pbrs_farm.study.pixel_rays import ray_channels, rays_of_cameras
+from pbrs_farm.study.pixel_rays import mirrored_rays, ray_channels, rays_of_cameras
 from pbrs_farm.study.tasks.study_task import Arrays, StudyTask
 from pbrs_farm.study.training.training_views import ViewArrays
 from pbrs_farm.study.training_plan import TrainingPlan
 
 _BATCH = 16  # pictures per forward pass
+_MIRROR_S = 1.0  # maximum wall seconds of a second pass by default
 
 
 @dataclass(frozen=True, slots=True)
@@ -57,11 +59,14 @@ def predict(
     plan: TrainingPlan,
     sizes: Sequence[tuple[int, int]] = (),
     cameras: F32 | None = None,
+    *,
+    mirror: bool = False,
 ) -> Iterator[NDArray[Any]]:
     """Predictions of the pictures in colour (N, H, W, 3), in order. The network's mode is restored.
 
     sizes: (height, width) of each prediction, by default that of colour.
     cameras: (N, 4) fx, fy, cx, cy at colour's size, required by plans with `rays`.
+    mirror: average with the prediction of the mirrored picture.
     """
     if plan.rays and cameras is None:
         text = "the network needs each pixel's ray, but these pictures have no camera"
@@ -79,6 +84,12 @@ def predict(
                 rays = rays_of_cameras(batch_cameras, *colour.shape[1:3])
             with torch.no_grad(), torch.autocast(device.type, torch.bfloat16, enabled=plan.bf16):
                 output = network_output(network, as_colour(pictures), plan, rays).float()
+                if mirror:
+                    all_flips = torch.ones(len(pictures), dtype=torch.bool, device=device)
+                    flipped_rays = None if rays is None else mirrored_rays(rays, all_flips)
+                    flipped = as_colour(pictures.flip(2))
+                    second = network_output(network, flipped, plan, flipped_rays).float()
+                    output = task.mirror_mean(output, second.flip(3))
             if all(size == tuple(output.shape[-2:]) for size in sizes[batch]):
                 yield from task.predictions(output)
                 continue
@@ -119,6 +130,13 @@ class _Whole(nn.Module):  # type: ignore[misc]
         return network_output(self.network, colour, self.plan, rays)
 
 
+def check_onnx() -> None:
+    """Raise MachineFailed without the packages that write ONNX."""
+    missing = [name for name in ("onnx", "onnxscript") if find_spec(name) is None]
+    if missing:
+        raise MachineFailed(f"ONNX needs {missing[0]}", hint=install_command("study"))
+
+
 def write_onnx(network: nn.Module, plan: TrainingPlan, path: Path) -> None:
     """Write the network as ONNX: input colour (1, 3, H, W) float 0..1 at the plan's size, output map.
 
@@ -127,9 +145,7 @@ def write_onnx(network: nn.Module, plan: TrainingPlan, path: Path) -> None:
     with `rays` have a second input of that name, (1, H, W, 2): x and y of each pixel's direction
     (x, y, 1), x right, y down. Raises MachineFailed without onnx and onnxscript.
     """
-    missing = [name for name in ("onnx", "onnxscript") if find_spec(name) is None]
-    if missing:
-        raise MachineFailed(f"ONNX needs {missing[0]}", hint=install_command("study"))
+    check_onnx()
     whole = _Whole(network, plan).cpu().float().eval()
     inputs = [torch.zeros(1, 3, plan.height_px, plan.width_px)]
     inputs += [torch.zeros(1, plan.height_px, plan.width_px, 2)] if plan.rays else []
@@ -144,6 +160,18 @@ def write_onnx(network: nn.Module, plan: TrainingPlan, path: Path) -> None:
             verbose=False,
         )
     program.save(path, external_data=False)
+
+
+def is_mirror_cheap(network: nn.Module, task: StudyTask, plan: TrainingPlan) -> bool:
+    """True if a second pass costs less than a second for a picture of the plan's size on this device."""
+    picture = np.zeros((1, plan.height_px, plan.width_px, 3), np.uint8)
+    camera = np.full((1, 4), plan.width_px, np.float32)
+    seconds = []
+    for _ in range(2):  # the first pass loads kernels
+        began = time.perf_counter()
+        list(predict(network, picture, task, plan, cameras=camera))
+        seconds.append(time.perf_counter() - began)
+    return min(seconds) < _MIRROR_S
 
 
 def as_colour(pictures: torch.Tensor) -> torch.Tensor:

@@ -13,16 +13,24 @@ from scipy.io import savemat
 
 from pbrs_farm.cli import main
 from pbrs_farm.core.errors import BadInput
+from pbrs_farm.curate.photographs import PhotoFiles
 from pbrs_farm.images import jpeg_from_array, png_from_array
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.judging.ablation import ablation_table, hold_out_notes, training_sets
-from pbrs_farm.study.judging.evaluation import evaluate, mean_interval, notes, open_run
+from pbrs_farm.study.judging.evaluation import (
+    evaluate,
+    evaluation_text,
+    mean_interval,
+    notes,
+    open_run,
+    with_others,
+)
 from pbrs_farm.study.judging.figure_text import is_underfit, markdown, shown_figure, spread_text
 from pbrs_farm.study.judging.judged_places import open_judged_place, open_judged_places
 from pbrs_farm.study.judging.others_predictions import OthersPredictions, predictions_in
 from pbrs_farm.study.judging.paper_figures import PAPER, paper_row
-from pbrs_farm.study.photographs import crop_to_size
-from pbrs_farm.study.real_frames import camera_of
+from pbrs_farm.study.photographs import crop_to_size, middle_of_form
+from pbrs_farm.study.real_frames import camera_of, room_of
 from pbrs_farm.study.sun_rgbd_labels import classes_of_scene
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.view_sources import TrainingSource, held_out_views, training_views
@@ -110,14 +118,16 @@ def test_the_table_shows_homes_baseline_and_paper_side_by_side(
     assert "paper: MLT-IL/OL, on NYUv2" in text
     assert "27.90" in text
     assert "underfit" in text
-    assert "planes fitted to depth" in text
+    assert "planes fitted to raw depth" in text
     # Random colours teach nothing, so that the held-out home may be judged separately.
     figures = json.loads((run / "e" / "evaluation.json").read_text())
     assert [row["n_views"] for row in figures["evaluations"]] == [3, 1]
     assert set(figures["evaluations"][1]["errors"]) == {"wall"}
     # The photograph's wall is 2 m away and faces the camera; the home's views have depth as well.
     parts = [row["parts"] for row in figures["evaluations"]]
-    assert parts[1].keys() == {"network", "mean normal"}
+    names = ("network", "mean normal", "floor of the truth")
+    assert parts[1].keys() == {*names, *(f"{name}, large planes" for name in names)}
+    assert parts[0].keys() == {"network", "mean normal"}, "rendered truth needs no floor"
     assert {"frontal", "2 to 4 m"} <= parts[1]["mean normal"].keys()
     assert not {"up", "nearer than 2 m"} & parts[1]["mean normal"].keys()
     assert any(" m" in part for part in parts[0]["network"])
@@ -145,8 +155,90 @@ def test_photographs_of_rooms_are_reported_by_room_with_an_interval(run: Path, p
     trained = open_run(run)
     evaluation = evaluate(trained, open_judged_place(str(pairs), trained.plan, mode="mlt_il_ol"))
     assert set(evaluation.groups) == {"", "bath", "hall", "kitchen"}
-    assert any("over its 4 homes or folders" in line for line in notes(trained, [evaluation]))
+    assert any("over its 4 homes or rooms" in line for line in notes(trained, [evaluation]))
     assert evaluation.as_json()["groups"] == evaluation.groups
+
+
+def write_corner(folder: Path, seed: int) -> NDArray[np.float64]:
+    """A noisy photograph of a floor before a wall; its exact normals (120, 160, 3)."""
+    folder.mkdir()
+    rng = np.random.default_rng(seed)
+    columns, rows = np.meshgrid(np.arange(160) + 0.5, np.arange(120) + 0.5)
+    rays = np.stack([(columns - 80) / 130, (rows - 60) / 130, np.ones_like(rows)], -1)
+    planes = np.array([[0, -0.94, -0.34], [0.6, 0, -0.8]])
+    depths = [
+        -distance / (rays @ plane) for plane, distance in zip(planes, (1.2, 2.5), strict=True)
+    ]
+    is_floor = (depths[0] > 0) & (depths[0] < depths[1])
+    depth = 1 / (1 / np.where(is_floor, *depths) + rng.normal(0, 0.002, rows.shape))
+    depth[:, :30] = 0
+    np.save(folder / "1_depth.npy", depth.astype(np.float32))
+    rgb = rng.integers(0, 256, (120, 160, 3)).astype(np.uint8)
+    (folder / "1_rgb.png").write_bytes(png_from_array(rgb))
+    (folder / "intrinsics.json").write_text('{"fx": 130, "fy": 130, "cx": 80, "cy": 60}')
+    return np.where(is_floor[..., None], *planes)
+
+
+def test_a_perfect_network_errs_by_the_floor_of_the_truth_and_not_by_large_planes(
+    run: Path, tmp_path: Path
+) -> None:
+    exact = [write_corner(tmp_path / name, k) for k, name in enumerate(("a_1", "a_2", "b"))]
+    (tmp_path / "rooms.json").write_text('{"a_1": "a", "a_2": "a"}')
+    trained = open_run(run)
+    views = open_judged_place(str(tmp_path), trained.plan, mode="mlt_il_ol")
+    evaluation = evaluate(trained, views, mirror=True)
+    rows, columns = middle_of_form(120, 160, 40, 32)
+    crops = [normal[rows, columns] for normal in exact]
+    evaluation = with_others(trained, evaluation, "perfect", crops)
+    # The two pictures of room a are wrong by a right angle, that of b is not.
+    halves = [np.stack([n[..., 1], -n[..., 0], 0 * n[..., 0]], -1) for n in crops[:2]]
+    evaluation = with_others(trained, evaluation, "half", [*halves, crops[2]])
+    row = evaluation.as_json()
+    means = {name: figures["mean_deg"] for name, figures in row["figures"].items()}
+    assert 4 < means["perfect"] < 12
+    assert means["floor of the truth"] == pytest.approx(means["perfect"], rel=0.25)
+    assert means["perfect, large planes"] < 0.5
+    assert means["floor of the truth, large planes"] == pytest.approx(means["perfect"], rel=0.15)
+    assert row["parts"]["perfect, large planes"].keys() >= {"up", "oblique", "2 to 4 m"}
+    # A fifth of the width has no depth; the crop's sides are cut.
+    measured = np.mean([truth["valid"].mean() for truth in views.truths])
+    assert row["measured"] == pytest.approx(measured)
+    assert 0.5 < row["on_large_planes"] < row["measured"] < 0.83
+    assert row["mirror"]
+    errors = evaluation.rows["half"].errors
+    assert row["over_rooms"]["half"] == pytest.approx((np.mean(errors[:2]) + errors[2]) / 2)
+    assert row["groups"].keys() == {"a", "b"}
+    text = evaluation_text(trained, [evaluation])
+    assert "large planes: mean, degrees" in text
+    assert f"{100 * measured:.0f} % of the pixels measured" in text
+    assert "averaged with those of the mirrored pictures" in text
+
+
+@pytest.mark.parametrize(
+    ("layout", "id", "room"),
+    [
+        ("", "scene0012_00/color/000100", "scene0012"), ("", "scene0012_01/000100", "scene0012"),
+        ("", "kitchen_0004/7", "kitchen_0004"), ("", "7", ""),
+        ("sun", "kv2/kinect2data/000002_2014-05-26_14-23-37_260595134347_rgbf000103-resize",
+         "kv2/kinect2data/000002_2014-05-26_14-23-37_260595134347"),
+        ("sun", "kv1/NYUdata/NYU0001", "kv1/NYUdata/NYU0001"),
+        ("sun", "xtion/sun3ddata/brown_bm_1/brown_bm_1/000103", "xtion/sun3ddata/brown_bm_1/brown_bm_1"),
+    ],
+)  # fmt: skip
+def test_scans_and_videos_of_a_room_are_one(
+    tmp_path: Path, layout: str, id: str, room: str
+) -> None:
+    picture = tmp_path / id / "image/1.jpg"
+    if layout:
+        (tmp_path / id / "extrinsics").mkdir(parents=True)
+        (tmp_path / id / "intrinsics.txt").write_text("")
+    assert room_of(PhotoFiles(id, picture, picture), tmp_path) == room
+
+
+def test_a_damaged_list_of_rooms_is_named(pairs: Path) -> None:
+    (pairs / "rooms.json").write_text('["kitchen"]')
+    with pytest.raises(BadInput, match=r"rooms\.json: expected the room of each folder"):
+        open_judged_place(str(pairs), small_plan(), mode="mlt_il_ol")
 
 
 def test_photographs_are_judged_at_full_size(pairs: Path) -> None:
@@ -253,12 +345,14 @@ def test_sun_rgbds_depth_has_its_bits_turned_back(tmp_path: Path) -> None:
         for name in ("image", "depth", "depth_bfx", "extrinsics"):
             (scene / name).mkdir(parents=True)
         (scene / f"image/{k}.jpg").write_bytes(jpeg_from_array(np.full((60, 90, 3), 99, np.uint8)))
-        for name in ("depth", "depth_bfx"):
-            mm = np.full((60, 90), 2000 + 100 * k, np.uint16)
+        mm = np.full((60, 90), 2000 + 100 * k, np.uint16)
+        for name, column in (("depth", 0), ("depth_bfx", mm[:, 0])):
+            mm[:, 20] = column  # a hole, and how it was filled
             (scene / f"{name}/{k}_abs.png").write_bytes(png_from_array(mm << 3 | mm >> 13))
         (scene / "intrinsics.txt").write_text("80 0 45\n0 80 30\n0 0 1\n")
     views = open_judged_place(str(tmp_path), small_plan("depth"), mode="mlt_il_ol")
-    assert [float(t["depth"].mean()) for t in views.truths] == pytest.approx([2.0, 2.1])
+    assert [float(t["depth"].max()) for t in views.truths] == pytest.approx([2.0, 2.1])
+    assert all((t["depth"] == 0).sum() == 60 for t in views.truths), "raw depth judges"
 
 
 def write_sun_scene(scene: Path) -> None:

@@ -111,7 +111,7 @@ def test_a_run_with_photographs_records_them_and_they_may_not_judge(
     record = json.loads((out / "run.json").read_text())
     assert len(record["photographs"][0]["pictures"]) == 4
     assert record["views"]["train"] == 6
-    assert "planes fitted to depth" in record["truth"]
+    assert "planes fitted to raw depth" in record["truth"]
     # The same files in another folder are the same photographs.
     (tmp_path / "moved").mkdir()
     sequences.rename(tmp_path / "moved/elsewhere")
