@@ -19,7 +19,7 @@ with atheris.instrument_imports(include=["pbrs_farm"]):
     from pbrs_farm.core.recipe import ReadFields
     from pbrs_farm.prepare.formats import format_of_kind
     from pbrs_farm.read.common.format import GivenFile
-    from pbrs_farm.read.sweethome3d.home_file.java_stream import JavaStreamError, java_objects
+    from pbrs_farm.read.sweethome3d.home_file.java_home import JavaStreamError, java_objects
     from tests.hostile import sound_inputs
     from tests.inputs import ifc_files, mjcf_files
 

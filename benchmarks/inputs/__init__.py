@@ -71,7 +71,7 @@ def class_agreement() -> float:
     from importlib.resources import files
 
     from pbrs_farm.core.classes import NYU40_NAMES
-    from pbrs_farm.read.common.box_only_items import box_only_item
+    from pbrs_farm.read.common.given_classes import box_only_item
 
     text = files("pbrs_farm.read.common").joinpath("given_classes.csv").read_text("utf-8")
     right = []

@@ -26,8 +26,7 @@ from pbrs_farm.installation import install_command, is_installed
 from pbrs_farm.prepare.home_kinds import HOME_KIND
 from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.read.common.format import PLAN, Format, GivenFile
-from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.usd import FORMAT as STAGE
 from pbrs_farm.read.usd import SUFFIXES
 from pbrs_farm.regular_files import MAX_SCENE_BYTES, fault_of, open_regular

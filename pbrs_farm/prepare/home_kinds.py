@@ -24,8 +24,7 @@ from pbrs_farm.core.plugins import PluginHome, is_plugin, marks_in_digest, plugi
 from pbrs_farm.core.recipe import ReadFields, Recipe, with_settings
 from pbrs_farm.prepare.dress_catalogue import catalogue_of_words
 from pbrs_farm.prepare.source_ref import SourceRef, home_id
-from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.regular_files import fault_of, naming_kind
 
 if TYPE_CHECKING:

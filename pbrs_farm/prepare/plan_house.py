@@ -18,8 +18,8 @@ from pbrs_farm.generate.home_file import home_contents
 from pbrs_farm.generate.plans.plan_files import PlanFile, PlanStorey, plan_from_file, upright
 from pbrs_farm.generate.plans.plan_format import Part, part_of
 from pbrs_farm.prepare.stand_ins import with_stand_ins
-from pbrs_farm.read.common.box_only_items import box_only_item
 from pbrs_farm.read.common.format import PLAN, GivenFile
+from pbrs_farm.read.common.given_classes import box_only_item
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.sweethome3d.home import read_home
 from pbrs_farm.read.usd import SUFFIXES, scan_of_stage

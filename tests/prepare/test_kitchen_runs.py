@@ -13,7 +13,7 @@ from pbrs_farm.core.catalogue import EMPTY, Catalogue
 from pbrs_farm.core.house import House, Item
 from pbrs_farm.furnishings.things.families import family_pieces, with_families
 from pbrs_farm.prepare.stand_ins import with_stand_ins
-from pbrs_farm.read.common.box_only_items import box_only_item
+from pbrs_farm.read.common.given_classes import box_only_item
 from tests.inputs.empty_room import empty_room
 
 Triple = tuple[float, float, float]

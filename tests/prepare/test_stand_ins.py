@@ -12,7 +12,7 @@ from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
 from pbrs_farm.core.house import House, Item, ItemKind, Material, MaterialKind
 from pbrs_farm.geometry.solids import box_quads, quads_surface
 from pbrs_farm.prepare.stand_ins import STAND_IN, has_box_only_items, with_stand_ins
-from pbrs_farm.read.common.box_only_items import box_only_item
+from pbrs_farm.read.common.given_classes import box_only_item
 from tests.inputs.empty_room import empty_room
 
 BED, CHAIR, TABLE = 4, 5, 7

@@ -17,8 +17,7 @@ from pbrs_farm.prepare.home_kinds import object_source
 from pbrs_farm.prepare.read_source import read_house
 from pbrs_farm.prepare.source import resolve
 from pbrs_farm.prepare.source_ref import SourceRef
-from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.objects.model_folders import find_models
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.step_cache import StepOutput, Work, run_unless_done

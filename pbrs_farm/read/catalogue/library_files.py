@@ -1,6 +1,7 @@
 """Furniture libraries on disk: catalogue entries, and the archives with their models.
 
-Effects: opens `.sh3f` files and the program's jar; reads their catalogues, and models on demand.
+Catalogues are Java property files. Effects: opens `.sh3f` files and the program's jar; reads their
+catalogues, and models on demand.
 """
 
 from __future__ import annotations
@@ -14,11 +15,64 @@ from typing import Final
 from pbrs_farm.core.errors import BadHouse, BadInput
 from pbrs_farm.core.house import Note
 from pbrs_farm.core.shown_text import MAX_MESSAGE, MAX_PLACE, shown
-from pbrs_farm.read.catalogue.property_files import numbered_entries, numbers, parse_properties
-from pbrs_farm.read.common.resources import ZipResources
+from pbrs_farm.read.common.source_files import ZipResources
 from pbrs_farm.read.sweethome3d.home_file.home_xml import DoorFrame, Paint, PlanLight, PlanPiece
-from pbrs_farm.read.sweethome3d.home_file.parse_furniture import FULL_CUT_OUT
-from pbrs_farm.regular_files import digest_of_regular, fault_of, naming_kind
+from pbrs_farm.read.sweethome3d.home_file.parse_home import FULL_CUT_OUT
+from pbrs_farm.regular_files import digest_of_regular, fault_of, naming_kind, text_from_bytes
+
+_ESCAPE: Final = re.compile(r"\\(u[0-9a-fA-F]{4}|.)", re.DOTALL)
+_LETTERS: Final = {"t": "\t", "n": "\n", "r": "\r", "f": "\f"}
+_ENTRY: Final = re.compile(r"((?:\\.|[^\s\\:=])+)\s*[:=]?\s*(.*)", re.DOTALL)
+
+
+def parse_properties(data: bytes) -> dict[str, str]:
+    """Parse a Java properties file, UTF-8 or Latin-1; later lines first, malformed lines ignored."""
+    try:
+        text = text_from_bytes(data)
+    except UnicodeDecodeError:
+        text = data.decode("latin-1")
+    properties = {}
+    whole = ""
+    for raw in text.splitlines():
+        line = raw.lstrip()
+        if not whole and (not line or line[0] in "#!"):
+            continue
+        # Join continued lines: an odd number of backslashes ends them.
+        n_slashes = len(line) - len(line.rstrip("\\"))
+        whole += line[:-1] if n_slashes % 2 else line
+        if n_slashes % 2:
+            continue
+        match = _ENTRY.fullmatch(whole)
+        whole = ""
+        if match is not None:
+            properties[_unescape(match[1])] = _unescape(match[2]).strip()
+    return properties
+
+
+def numbered_entries(properties: dict[str, str]) -> list[dict[str, str]]:
+    """The entries `key#1`, `key#2`, ... (at most six digits) of a catalogue, by their numbers."""
+    rows: dict[int, dict[str, str]] = {}
+    for key, value in properties.items():
+        name, mark, number = key.partition("#")
+        if mark and number.isascii() and number.isdigit() and len(number) < 7:
+            rows.setdefault(int(number), {})[name] = value
+    return [rows[k] for k in sorted(rows)]
+
+
+def numbers(text: str) -> list[float]:
+    """The numbers in a value, separated by spaces; ValueError for any other word."""
+    return [float(word) for word in text.split()]
+
+
+def _unescape(text: str) -> str:
+    def letter(match: re.Match[str]) -> str:
+        code = match[1]
+        if len(code) == 5:
+            return chr(int(code[1:], 16))
+        return _LETTERS.get(code, code)
+
+    return _ESCAPE.sub(letter, text)
+
 
 FURNITURE: Final = "PluginFurnitureCatalog.properties"
 JAR_FURNITURE: Final = "com/eteks/sweethome3d/io/DefaultFurnitureCatalog.properties"

@@ -20,8 +20,8 @@ from typing import Any, Final
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse, BadInput
 from pbrs_farm.read.catalogue.library_files import LibraryNotes
-from pbrs_farm.read.common.bounded_json import bounded_json
 from pbrs_farm.read.common.given_classes import given_class
+from pbrs_farm.read.common.json_values import bounded_json
 from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular, text_from_bytes
 
 Size = tuple[float, float, float]

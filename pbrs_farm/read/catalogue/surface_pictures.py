@@ -28,13 +28,13 @@ from pbrs_farm.read.catalogue.library_files import (
     LibraryNotes,
     OpenedLibrary,
     licence_of,
+    numbered_entries,
     opened_library,
 )
 from pbrs_farm.read.catalogue.library_shapes import small_texture
-from pbrs_farm.read.catalogue.property_files import numbered_entries
 from pbrs_farm.read.common.furniture_classes import plain
 from pbrs_farm.read.common.material_library import texture_from_bytes
-from pbrs_farm.read.common.resources import Resources
+from pbrs_farm.read.common.source_files import Resources
 from pbrs_farm.regular_files import read_regular
 
 TEXTURES: Final = "PluginTexturesCatalog.properties"

@@ -12,8 +12,7 @@ from pbrs_farm.core.data_format import DataFormat
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 
 PLAN: Final = "plan"
 """Kind of all floor-plan sources, in any format."""

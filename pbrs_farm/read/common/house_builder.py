@@ -1,22 +1,61 @@
-"""A house under construction by a reader: levels from rooms, items, doors and windows, limits. No effects."""
+"""A house under construction by a reader: structure, levels of rooms, openings, limits. No effects."""
 
 from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field, replace
+from typing import Final
 
 import numpy as np
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.classes import CEILING, FLOOR, WALL
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.core.house import MAX_INSTANCES, House, Item, Level, Opening, Room, Source
+from pbrs_farm.core.house import (
+    MAX_INSTANCES,
+    House,
+    Item,
+    ItemKind,
+    Level,
+    Opening,
+    Room,
+    Source,
+    Surface,
+)
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.doors_and_windows import Hole, fill_hole, opening_of
 from pbrs_farm.read.common.material_library import MaterialLibrary
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.room_limits import check_rooms
-from pbrs_farm.read.common.rooms import level_of, levels_of, room_at
+from pbrs_farm.read.common.rooms import check_rooms, level_of, levels_of, room_at
+
+# NYU40 class of each kind; grounds have none.
+CLASS_OF_STRUCTURE: Final = {ItemKind.WALL: WALL, ItemKind.FLOOR: FLOOR, ItemKind.CEILING: CEILING}
+
+
+def structure_item(
+    item_id: str,
+    kind: ItemKind,
+    surfaces: Sequence[Surface],
+    *,
+    name: str = "",
+    level_id: str = "0",
+    source_class: str = "",
+    room_id: str | None = None,
+    boundary_of: Sequence[str] = (),
+) -> Item:
+    """An item of a structure's kind. name, source_class: by default the kind; boundary_of: rooms of a wall."""
+    return Item(
+        id=item_id,
+        name=name or kind.value,
+        kind=kind,
+        level_id=level_id,
+        surfaces=tuple(surfaces),
+        nyu40=CLASS_OF_STRUCTURE.get(kind, 0),
+        source_class=source_class or kind.value.title(),
+        room_id=room_id,
+        tags=tuple(f"boundary_of:{room}" for room in boundary_of),
+    )
 
 
 @dataclass(slots=True)

@@ -1,4 +1,4 @@
-"""Values of scene files in JSON, checked: numbers, names, axes, overrides of a model's materials. No effects."""
+"""Values of scene files in JSON, checked: size, numbers, names, axes, overrides of materials. No effects."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from pydantic import (
 )
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.checked_json import Finite, exactly
+from pbrs_farm.core.checked_json import Finite, exactly, json_from_bytes
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import affine, is_flattening
 
@@ -96,3 +96,21 @@ class Axes(Given):
         up, front = self.up / np.linalg.norm(self.up), self.front / np.linalg.norm(self.front)
         # Make the third axis of the two, so that the frame is right-handed.
         return affine(self.scale * np.array([np.cross(up, front), up, front]))
+
+
+MAX_JSON_BYTES: Final = 192_000_000
+"""Of a house's file: furnished houses have a tenth of it."""
+
+# A list or an object takes some 60 bytes and more, a number 32: together they stay below 2 GB.
+_MOST_GROUPS: Final = 4_000_000
+_MOST_VALUES: Final = 24_000_000
+
+
+def bounded_json(data: bytes, file: str) -> Any:
+    """Parse JSON; BadHouse for invalid text, or (by counting brackets and commas first) for too many values."""
+    n_groups = data.count(b"{") + data.count(b"[")
+    n_values = data.count(b",")
+    if n_groups > _MOST_GROUPS or n_values > _MOST_VALUES:
+        text = f"has {n_groups} objects and lists and {n_values} values, more than any house"
+        raise BadHouse(file, "", text)
+    return json_from_bytes(data, file)

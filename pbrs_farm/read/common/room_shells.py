@@ -23,7 +23,7 @@ from pbrs_farm.core.mesh import (
     unit_vectors,
 )
 from pbrs_farm.geometry.connected import connected_faces
-from pbrs_farm.read.common.structure_items import CLASS_OF_STRUCTURE
+from pbrs_farm.read.common.house_builder import CLASS_OF_STRUCTURE
 
 MAX_PLANES: Final = 200  # A wall of more planes is sculpted, not built of sheets, and stays whole
 

@@ -12,7 +12,7 @@ from pbrs_farm.core.arrays import F64, I32
 from pbrs_farm.core.checked_json import checked
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import affine, rotation_of_quaternion
-from pbrs_farm.read.common.bounded_json import bounded_json
+from pbrs_farm.read.common.json_values import bounded_json
 from pbrs_farm.read.common.notes import Notes
 
 MAX_ENTRIES: Final = 100_000

@@ -33,18 +33,15 @@ from pbrs_farm.geometry.plan_surfaces import horizontal
 from pbrs_farm.home.given_rooms import NO_ROOM, given_room
 from pbrs_farm.home.names import parted
 from pbrs_farm.home.room_use import named_kind
-from pbrs_farm.read.common.bounded_json import MAX_JSON_BYTES
 from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.given_classes import LEFT_OUT, class_by_words, given_class
-from pbrs_farm.read.common.house_builder import HouseBuilder
-from pbrs_farm.read.common.json_values import NAME
+from pbrs_farm.read.common.house_builder import CLASS_OF_STRUCTURE, HouseBuilder, structure_item
+from pbrs_farm.read.common.json_values import MAX_JSON_BYTES, NAME
 from pbrs_farm.read.common.model_materials import MAX_TEXTURE_BYTES, ModelMaterials
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.room_floors import floor_height, floor_polygon
-from pbrs_farm.read.common.room_limits import check_number, check_unit
-from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.common.source_files import SourceFiles
-from pbrs_farm.read.common.structure_items import CLASS_OF_STRUCTURE, structure_item
+from pbrs_farm.read.common.rooms import check_number, check_unit
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.front3d.front_file import FrontFile, FrontMesh, front_file
 from pbrs_farm.read.front3d.front_openings import HOLE_TYPES, holes_with_names
 from pbrs_farm.read.front3d.front_pieces import (

@@ -19,14 +19,22 @@ from pbrs_farm.core.lighting import BULB_RADIUS_M, PowerUnit
 from pbrs_farm.core.mesh import area_vectors
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.home.lamps import flux_for_floor
-from pbrs_farm.read.common.box_only_items import box_only_item
-from pbrs_farm.read.common.given_classes import GivenClass, class_by_words, given_class
+from pbrs_farm.read.common.given_classes import (
+    GivenClass,
+    box_only_item,
+    class_by_words,
+    given_class,
+)
 from pbrs_farm.read.common.json_values import NAME
-from pbrs_farm.read.common.model_cache import DamagedModel, ModelCache, ParsedModel
-from pbrs_farm.read.common.model_materials import ModelMaterials
+from pbrs_farm.read.common.model_materials import (
+    DamagedModel,
+    ModelCache,
+    ModelMaterials,
+    ParsedModel,
+)
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.placed_mesh import assumed_light, oriented_box, placed
-from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import RootFolder
 from pbrs_farm.read.front3d.front_file import FrontLight, FrontPiece
 from pbrs_farm.read.front3d.front_openings import is_opening
 from pbrs_farm.read.mesh.obj import Mesh

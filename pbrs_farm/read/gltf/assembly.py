@@ -11,8 +11,7 @@ from typing import Any, Final
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.formats.glb import Gltf
-from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.gltf.document import files_of_gltf, gltf_document, object_at
 from pbrs_farm.read.gltf.obj_document import files_of_obj, gltf_of_mesh
 from pbrs_farm.regular_files import MAX_SCENE_BYTES

@@ -19,16 +19,14 @@ from pbrs_farm.read.common.material_library import (
     OPAQUE_ALPHA,
     LoadedTexture,
     MaterialLibrary,
-    opened_picture,
-)
-from pbrs_farm.read.common.model_materials import GREY
-from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.picture_values import (
     PictureValues,
     base_colour_picture,
+    opened_picture,
     picture_mean,
     picture_of_values,
 )
+from pbrs_farm.read.common.model_materials import GREY
+from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.gltf.compressed import BASISU, decoded_picture
 from pbrs_farm.read.gltf.document import (
     UNREAD,

@@ -15,8 +15,7 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.formats.glb import Gltf
-from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.common.source_files import SourceFiles, read_mtl
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles, read_mtl
 from pbrs_farm.read.gltf.scene_writer import SceneWriter, matrix_row
 from pbrs_farm.read.mesh.mtl import ObjMaterial, laid
 from pbrs_farm.read.mesh.obj import Mesh, parse_obj

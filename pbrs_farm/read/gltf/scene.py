@@ -27,8 +27,7 @@ from pbrs_farm.read.common.name_classes import UNMAPPED
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.openings import openings
 from pbrs_farm.read.common.rooms import rooms_from_floors, rooms_from_json, rooms_from_value
-from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.gltf.document import Fetch, files_of_gltf, gltf_document, note_unread, object_at
 from pbrs_farm.read.gltf.materials import SceneMaterials
 from pbrs_farm.read.gltf.node_classes import Mapping, mapping_from_json

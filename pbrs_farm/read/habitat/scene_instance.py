@@ -24,8 +24,7 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import Gltf
 from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.gltf.assembly import Assembly, files_of_asset
 from pbrs_farm.read.gltf.document import meshes_of, numbers, object_at, placed_nodes
 from pbrs_farm.read.gltf.node_classes import Mapping

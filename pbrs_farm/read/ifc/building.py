@@ -38,7 +38,7 @@ from pbrs_farm.read.common.doors_and_windows import fill_hole
 from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.furniture_classes import PieceSize
 from pbrs_farm.read.common.given_classes import GivenClass, given_class
-from pbrs_farm.read.common.house_builder import HouseBuilder
+from pbrs_farm.read.common.house_builder import HouseBuilder, structure_item
 from pbrs_farm.read.common.material_library import PANE_OPACITY, MaterialLibrary
 from pbrs_farm.read.common.name_classes import UNMAPPED, NodeClass, class_of_node_name
 from pbrs_farm.read.common.notes import Notes
@@ -46,7 +46,6 @@ from pbrs_farm.read.common.openings import openings, openings_of_voids
 from pbrs_farm.read.common.placed_mesh import across_last, assumed_light, oriented_box, placed
 from pbrs_farm.read.common.room_floors import covered_share, floor_polygon
 from pbrs_farm.read.common.rooms import rooms_from_floors, rooms_from_walls
-from pbrs_farm.read.common.structure_items import structure_item
 from pbrs_farm.read.ifc.ceilings import NEAR_M, ROOF_WORDS, Overheads, with_roofs
 from pbrs_farm.read.ifc.doors_and_windows import (
     glass_parts,

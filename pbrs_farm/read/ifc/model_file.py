@@ -14,7 +14,7 @@ from scipy.sparse import coo_array
 from scipy.sparse.csgraph import connected_components
 
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.read.common.resources import ZipResources
+from pbrs_farm.read.common.source_files import ZipResources
 from pbrs_farm.regular_files import read_given, text_from_bytes
 
 _MOST_BYTES: Final = 512 * 2**20

@@ -27,9 +27,8 @@ from pbrs_farm.read.common.name_classes import class_of_node_name
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.gltf.document import UNREAD
 from pbrs_farm.read.gltf.node_classes import Mapping, collection_of, mapping_from_json
-from pbrs_farm.read.gltf.node_joints import KEY, joint_row
 from pbrs_farm.read.gltf.scene import house_of_gltf, side_files
-from pbrs_farm.read.gltf.scene_writer import SceneWriter, matrix_row
+from pbrs_farm.read.gltf.scene_writer import KEY, SceneWriter, joint_row, matrix_row
 from pbrs_farm.read.mjcf.geoms import UNREAD as UNREAD_SHAPES
 from pbrs_farm.read.mjcf.geoms import (
     is_endless,

@@ -11,8 +11,7 @@ from defusedxml.ElementTree import fromstring
 
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.read.common.format import GivenFile, root_of
-from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 
 MAX_XML_BYTES: Final = 128 * 2**20
 _MOST_FILES: Final = 20_000

@@ -20,8 +20,7 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.name_classes import class_of_node_name
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.gltf.node_classes import Mapping
 from pbrs_farm.read.gltf.obj_document import files_of_obj, gltf_of_groups, materials_of_obj
 from pbrs_farm.read.gltf.scene import house_of_gltf

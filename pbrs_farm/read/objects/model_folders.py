@@ -19,8 +19,12 @@ from typing import Final
 from pbrs_farm.core import keys
 from pbrs_farm.core.classes import NYU40_NAMES, OTHERPROP
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.read.catalogue.library_files import FURNITURE, opened_archive
-from pbrs_farm.read.catalogue.property_files import numbered_entries, parse_properties
+from pbrs_farm.read.catalogue.library_files import (
+    FURNITURE,
+    numbered_entries,
+    opened_archive,
+    parse_properties,
+)
 from pbrs_farm.read.common.furniture_classes import nyu40_of
 
 _MODEL_SUFFIXES: Final = (".obj", ".glb", ".gltf")

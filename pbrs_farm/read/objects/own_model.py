@@ -28,8 +28,7 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.material_library import MaterialLibrary
 from pbrs_farm.read.common.model_materials import MAX_TEXTURE_BYTES
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.objects.model_folders import ObjectModel
 from pbrs_farm.read.objects.single_object import model_surfaces, object_companions
 from pbrs_farm.regular_files import (

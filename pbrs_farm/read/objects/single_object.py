@@ -22,12 +22,10 @@ from pbrs_farm.core.house import Box, House, Item, ItemKind, Level, MaterialKind
 from pbrs_farm.core.mesh import unit_vectors
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.material_library import MaterialLibrary
-from pbrs_farm.read.common.model_cache import ModelCache
-from pbrs_farm.read.common.model_materials import ModelMaterials
+from pbrs_farm.read.common.model_materials import ModelCache, ModelMaterials
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.placed_mesh import placed
-from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.gltf.document import files_of_gltf, gltf_document, note_unread
 from pbrs_farm.read.gltf.materials import SceneMaterials
 from pbrs_farm.read.gltf.node_classes import Mapping

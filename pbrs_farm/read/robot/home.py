@@ -16,8 +16,7 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.format import GivenFile, root_of
 from pbrs_farm.read.common.name_classes import class_of_node_name
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.gltf.assembly import Assembly, files_of_asset
 from pbrs_farm.read.gltf.document import UNREAD, placed_nodes
 from pbrs_farm.read.gltf.node_classes import Mapping, mapping_from_json

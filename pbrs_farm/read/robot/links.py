@@ -12,11 +12,10 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.joints import JointKind
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
 from pbrs_farm.geometry.solids import box
-from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.gltf.assembly import Assembly, files_of_asset
-from pbrs_farm.read.gltf.node_joints import KEY, joint_row
 from pbrs_farm.read.gltf.obj_document import gltf_of_groups
+from pbrs_farm.read.gltf.scene_writer import KEY, joint_row
 from pbrs_farm.read.mesh.mtl import ObjMaterial
 from pbrs_farm.read.mesh.obj import Mesh
 from pbrs_farm.read.mesh.shape import ball, cylinder_profile, shape_of_surface, turned

@@ -19,7 +19,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.joints import JointKind
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import RootFolder
 from pbrs_farm.read.robot.links import model_name
 from pbrs_farm.read.robot.urdf import (
     GREY,

@@ -17,18 +17,18 @@ from pbrs_farm.core.checked_json import Finite, checked
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.read.common.arch_elements import Element, element_of
-from pbrs_farm.read.common.bounded_json import bounded_json
 from pbrs_farm.read.common.json_values import (
     Axes,
     Given,
     Label,
     Lenient,
     affine_of_columns,
+    bounded_json,
     number_array,
 )
 from pbrs_farm.read.common.model_materials import ModelMaterials
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import RootFolder
 from pbrs_farm.read.suncg.arch_json import MAX_ELEMENTS
 
 MAX_OBJECTS: Final = 20_000

@@ -18,13 +18,12 @@ from pbrs_farm.core.classes import NYU40_NAMES, OTHERPROP
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Item, ItemKind, Surface
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.read.common.box_only_items import box_only_item
-from pbrs_farm.read.common.given_classes import GivenClass, class_by_words
+from pbrs_farm.read.common.given_classes import GivenClass, box_only_item, class_by_words
 from pbrs_farm.read.common.json_values import NAME
 from pbrs_farm.read.common.material_library import MaterialLibrary
 from pbrs_farm.read.common.notes import HARMLESS, Notes
 from pbrs_farm.read.common.placed_mesh import assumed_light, oriented_box, placed
-from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import RootFolder
 from pbrs_farm.read.gltf.document import gltf_document
 from pbrs_farm.read.gltf.materials import SceneMaterials
 from pbrs_farm.read.gltf.node_classes import Mapping

@@ -26,18 +26,15 @@ from pbrs_farm.read.common.arch_elements import (
     slab_surfaces,
     wall_surfaces,
 )
-from pbrs_farm.read.common.bounded_json import MAX_JSON_BYTES
 from pbrs_farm.read.common.doors_and_windows import Hole, merge_holes
 from pbrs_farm.read.common.format import GivenFile
-from pbrs_farm.read.common.house_builder import HouseBuilder
+from pbrs_farm.read.common.house_builder import HouseBuilder, structure_item
+from pbrs_farm.read.common.json_values import MAX_JSON_BYTES
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.openings import LEAST_HOLE_M
 from pbrs_farm.read.common.room_floors import ceiling_height, floor_height, floor_polygon
-from pbrs_farm.read.common.room_limits import check_number, check_unit
-from pbrs_farm.read.common.rooms import room_at
-from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.common.source_files import SourceFiles
-from pbrs_farm.read.common.structure_items import structure_item
+from pbrs_farm.read.common.rooms import check_number, check_unit, room_at
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.scenestate.scene_document import (
     ArchMaterials,
     SceneDocument,

@@ -5,8 +5,7 @@ from __future__ import annotations
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.format import Format, GivenFile
-from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 
 
 def _read_suncg(given: GivenFile, fields: ReadFields) -> House:

@@ -29,10 +29,10 @@ from pbrs_farm.read.common.arch_elements import (
     wall_frame,
     wall_surfaces,
 )
+from pbrs_farm.read.common.house_builder import structure_item
 from pbrs_farm.read.common.json_values import Axes
 from pbrs_farm.read.common.model_materials import ModelMaterials
 from pbrs_farm.read.common.openings import CUTTER_REACH_M, LEAST_HOLE_M, box_between
-from pbrs_farm.read.common.structure_items import structure_item
 from pbrs_farm.read.suncg.house_json import Node
 
 MAX_ELEMENTS: Final = 100_000

@@ -18,7 +18,7 @@ from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.core.house import ItemKind, LightPart
 from pbrs_farm.core.lighting import LightForm, PowerUnit
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import RootFolder
 from pbrs_farm.regular_files import text_from_bytes
 
 CLASS_TABLES: Final = ("ModelCategoryMappingNewActive.csv", "ModelCategoryMapping.csv")

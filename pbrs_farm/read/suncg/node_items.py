@@ -1,32 +1,40 @@
-"""Nodes of a SUNCG house -> placed items (docs/spec/suncg.md sections 1.3-1.6). Reads their models."""
+"""Nodes of a SUNCG house -> placed items with lights (docs/spec/suncg.md sections 1.3-2). Reads their models.
+
+An MTL has colours alone: the glass of a mirror or dressing table is found by its shape.
+"""
 
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Collection, Iterator, Sequence
 from dataclasses import dataclass, replace
 from typing import Final, TypeVar
 
 import numpy as np
 
-from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.classes import MIRROR, OTHERPROP
+from pbrs_farm.core.arrays import F64, triple
+from pbrs_farm.core.classes import DRESSER, MIRROR, OTHERPROP
 from pbrs_farm.core.frames import transform_points
-from pbrs_farm.core.house import Item, ItemKind, LightPart, Material, MaterialKind, Surface
+from pbrs_farm.core.house import Item, ItemKind, LightPart, Material, MaterialKind, Surface, part_of
+from pbrs_farm.core.lighting import BULB_RADIUS_M, PowerUnit
+from pbrs_farm.core.mesh import area_vectors, triangle_corners
+from pbrs_farm.geometry.connected import connected_faces
 from pbrs_farm.home.names import words_of
 from pbrs_farm.read.common.arch_elements import Arch
-from pbrs_farm.read.common.model_cache import DamagedModel, ModelCache, ParsedModel
-from pbrs_farm.read.common.model_materials import ModelMaterials
+from pbrs_farm.read.common.house_builder import structure_item
+from pbrs_farm.read.common.model_materials import (
+    DamagedModel,
+    ModelCache,
+    ModelMaterials,
+    ParsedModel,
+)
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.placed_mesh import oriented_box, placed
-from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.common.structure_items import structure_item
+from pbrs_farm.read.common.source_files import RootFolder
 from pbrs_farm.read.mesh.mtl import ObjMaterial
 from pbrs_farm.read.suncg.arch_json import arch_items
 from pbrs_farm.read.suncg.house_json import Node
-from pbrs_farm.read.suncg.lamp_lights import placed_light, separate_bulbs, with_emitting_bulbs
 from pbrs_farm.read.suncg.metadata import LampMaterials, ModelClass, Tables
-from pbrs_farm.read.suncg.mirror_glass import as_mirror, mirror_slot, mirror_slot_of_table
 
 _T = TypeVar("_T")
 
@@ -312,4 +320,163 @@ def _part_of_room(
         source_class=f"{node.model_id}{part}",
         room_id=room_id,
         boundary_of=(room_id,) if kind is ItemKind.WALL else (),
+    )
+
+
+# Power of a lamp that has bulbs but no row in suncgModelLights.json; shared by its bulbs.
+ASSUMED_WATT = 60.0
+
+
+def placed_light(light: LightPart, world_from_model: F64) -> LightPart:
+    """A light of a model's frame in the world."""
+    points = (
+        [light.position] if light.position_end is None else [light.position, light.position_end]
+    )
+    world = transform_points(world_from_model, np.array(points))
+    direction = world_from_model[:3, :3] @ np.array(light.direction)
+    direction /= max(float(np.linalg.norm(direction)), 1e-12)
+    return replace(
+        light,
+        position=triple(world[0]),
+        position_end=None if light.position_end is None else triple(world[1]),
+        direction=triple(direction),
+    )
+
+
+def separate_bulbs(bulb: Surface) -> tuple[Surface, ...]:
+    """The connected parts of a bulb material's surface, one per bulb."""
+    # Weld equal positions, then find the connected parts of the faces.
+    _, same = np.unique(bulb.positions, axis=0, return_inverse=True)
+    part_of_face = connected_faces(same.reshape(-1)[bulb.faces])
+    parts = np.unique(part_of_face)
+    if len(parts) == 1:
+        return (bulb,)
+    return tuple(
+        part_of(bulb, bulb.faces[part_of_face == part], f"{bulb.name}_{k}")
+        for k, part in enumerate(parts)
+    )
+
+
+def with_emitting_bulbs(
+    lights: Sequence[LightPart], surfaces: Sequence[Surface], bulbs: Sequence[int]
+) -> tuple[LightPart, ...]:
+    """lights with the bulbs (indices into surfaces) that emit each.
+
+    Every bulb belongs to the light nearest to it, and a light without one shares the bulb nearest
+    to it. Without lights every bulb is one, of an assumed power; without bulbs none emits, and
+    repair adds them.
+    """
+    if not bulbs:
+        return tuple(replace(light, radius_m=BULB_RADIUS_M) for light in lights)
+    # Centre and mean radius of each bulb.
+    bounds = [(surfaces[b].positions.min(0), surfaces[b].positions.max(0)) for b in bulbs]
+    centres = np.array([(low + high) / 2 for low, high in bounds], np.float64)
+    radii = [float(np.mean(high - low)) / 2 for low, high in bounds]
+    if not lights:
+        # Without lights every bulb is one, with an equal share of the assumed power.
+        share = 1 / len(bulbs)
+        return tuple(
+            LightPart(triple(c), r, ASSUMED_WATT, PowerUnit.WATT, share, emitting=(b,))
+            for c, r, b in zip(centres, radii, bulbs, strict=True)
+        )
+    positions = np.array([light.position for light in lights])
+    # Give every bulb to its nearest light; a light left without shares its nearest bulb.
+    distance = np.linalg.norm(positions[:, None] - centres[None], axis=2)
+    light_of_bulb = distance.argmin(0)
+    results = []
+    for k, light in enumerate(lights):
+        mine = np.flatnonzero(light_of_bulb == k)
+        if not len(mine):
+            mine = np.array([distance[k].argmin()])
+        emitting = tuple(bulbs[int(m)] for m in mine)
+        results.append(replace(light, radius_m=radii[int(mine[0])], emitting=emitting))
+    return tuple(results)
+
+
+_REFLECTANCE: Final = 0.9
+_FLAT_COS: Final = (
+    0.98  # minimum cosine between a face's normal and the glass's for the face to be part of it
+)
+_FLAT_SHARE: Final = 0.45  # least flat share of a material; a pane with back and edges has half
+# a dressing table's mirror, in shares of the model
+_LEAST_HEIGHT: Final = 0.35  # minimum height of its lower edge over the model's
+_MOST_DEPTH: Final = 0.5  # maximum depth of the model above that edge over the whole depth
+_LEAST_AREA: Final = 0.08  # minimum area, front and back, over width times height
+_TABLES: Final = frozenset(("dressing", "vanity", "makeup"))
+_NAMES: Final = ("mirror", "spiegel", "glass")  # an MTL's names are material_0, material_1 mostly
+
+
+def mirror_slot(model: ParsedModel) -> int | None:
+    """The position in the MTL of a mirror's glass, -1 for meshes without one; None if none is flat.
+
+    The glass faces away from the wall: of the materials that lie flat across the model's thinnest
+    level axis the one named so, else the one that shows the largest area.
+    """
+    # The thinner of the two level axes points out of the wall.
+    corners = np.concatenate([m.positions for m in model.meshes])
+    extent = np.ptp(corners, axis=0)
+    across = 0 if extent[0] < extent[2] else 2
+    areas = _areas_of_slots(model, across)
+    is_flat = [s for s, (whole, flat_area) in areas.items() if flat_area > _FLAT_SHARE * whole]
+
+    def rank(slot: int) -> tuple[bool, float]:
+        name = model.mtl[slot].name.lower() if slot >= 0 else ""
+        return any(word in name for word in _NAMES), areas[slot][1]
+
+    return max(is_flat, key=rank, default=None)
+
+
+def mirror_slot_of_table(
+    model: ParsedModel, class_words: Collection[str], nyu40: int
+) -> int | None:
+    """The position in the MTL of the glass of a dressing table's mirror; None without one.
+
+    The pane is upright, faces the front (z), and is part of a piece deeper below. Only the pane has its
+    material, which is plain and grey or bluish. A chest of drawers has no such pane.
+    """
+    if nyu40 != DRESSER and _TABLES.isdisjoint(class_words):
+        return None
+    points = np.concatenate([m.positions for m in model.meshes])
+    low, size = points.min(0), np.ptp(points, axis=0)
+    lowest: dict[int, float] = {}
+    for mesh, slot in zip(model.meshes, model.slots, strict=True):
+        lowest[slot] = min(lowest.get(slot, np.inf), float(mesh.positions[:, 1].min()))
+    panes: dict[int, float] = {}
+    for slot, (whole, flat_area) in _areas_of_slots(model, 2).items():
+        looks = model.mtl[slot] if slot >= 0 else ObjMaterial("")
+        above = points[points[:, 1] >= lowest[slot]]
+        is_pane = (
+            flat_area > _FLAT_SHARE * whole
+            and flat_area > _LEAST_AREA * size[0] * size[1]
+            and lowest[slot] > low[1] + _LEAST_HEIGHT * size[1]
+            and np.ptp(above[:, 2]) < _MOST_DEPTH * size[2]
+        )
+        is_cool = not looks.map_kd and looks.kd[0] <= looks.kd[2]
+        if is_pane and (is_cool or any(word in looks.name.lower() for word in _NAMES)):
+            panes[slot] = flat_area
+    return max(panes, key=panes.__getitem__, default=None)
+
+
+def _areas_of_slots(model: ParsedModel, across: int) -> dict[int, list[float]]:
+    """Index in the MTL -> total area, and area perpendicular to an axis."""
+    areas: dict[int, list[float]] = {}
+    for mesh, slot in zip(model.meshes, model.slots, strict=True):
+        normals = area_vectors(triangle_corners(mesh.positions, mesh.faces))
+        area = np.linalg.norm(normals, axis=1)
+        flat = np.abs(normals[:, across]) >= _FLAT_COS * area
+        sums = areas.setdefault(slot, [0.0, 0.0])
+        sums[0] += float(area.sum())
+        sums[1] += float(area[flat].sum())
+    return areas
+
+
+def as_mirror(material: Material) -> Material:
+    """The material as a mirror."""
+    return replace(
+        material,
+        kind=MaterialKind.MIRROR,
+        specular=(_REFLECTANCE,) * 3,
+        texture_id=None,
+        opacity=1.0,
+        alpha_cutout=False,
     )

@@ -16,8 +16,7 @@ from pbrs_farm.core.house import MAX_INSTANCES, House, Item, ItemKind, Level, Ro
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.arch_elements import Arch
 from pbrs_farm.read.common.json_values import NAME
-from pbrs_farm.read.common.model_cache import ModelCache
-from pbrs_farm.read.common.model_materials import ModelMaterials
+from pbrs_farm.read.common.model_materials import ModelCache, ModelMaterials
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.openings import openings
 from pbrs_farm.read.common.room_floors import (
@@ -26,9 +25,8 @@ from pbrs_farm.read.common.room_floors import (
     floor_height,
     floor_polygon,
 )
-from pbrs_farm.read.common.room_limits import check_rooms
-from pbrs_farm.read.common.root_folder import RootFolder
-from pbrs_farm.read.common.source_files import SourceFiles
+from pbrs_farm.read.common.rooms import check_rooms
+from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.suncg.arch_json import arch_from_json, arch_openings
 from pbrs_farm.read.suncg.house_json import HouseRecord, Node, house_record
 from pbrs_farm.read.suncg.metadata import (

@@ -19,9 +19,8 @@ from pbrs_farm.core.house import MAX_INSTANCES, House, Item, Level, Opening, Sou
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.core.shown_text import shown
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.resources import Resources
-from pbrs_farm.read.common.room_limits import HINT, check_outlines
-from pbrs_farm.read.sweethome3d.ceiling_heights import CeilingHeights
+from pbrs_farm.read.common.rooms import HINT, check_outlines
+from pbrs_farm.read.common.source_files import Resources
 from pbrs_farm.read.sweethome3d.door_cutouts import StandingWall
 from pbrs_farm.read.sweethome3d.home_file.container import Container, open_container
 from pbrs_farm.read.sweethome3d.home_file.home_xml import (
@@ -34,20 +33,19 @@ from pbrs_farm.read.sweethome3d.home_file.home_xml import (
     level_of,
 )
 from pbrs_farm.read.sweethome3d.home_file.parse_home import parse_plan
-from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_rooms import (
+    CeilingHeights,
     ReadRoom,
     plane_items,
     read_rooms,
     room_nouns,
     rooms_between_walls,
+    staircase_cuts,
 )
 from pbrs_farm.read.sweethome3d.open_doors import StandingPiece, opened_doors
 from pbrs_farm.read.sweethome3d.piece_items import piece_item, piece_opening
-from pbrs_farm.read.sweethome3d.piece_models import PieceModels
-from pbrs_farm.read.sweethome3d.staircases import staircase_cuts
-from pbrs_farm.read.sweethome3d.wall_outlines import Outline, outlines_of
-from pbrs_farm.read.sweethome3d.wall_solids import wall_items
+from pbrs_farm.read.sweethome3d.piece_models import HomeMaterials, PieceModels
+from pbrs_farm.read.sweethome3d.wall_solids import Outline, outlines_of, wall_items
 
 MAX_WALLS: Final = 3_000
 MAX_PIECES: Final = 10_000

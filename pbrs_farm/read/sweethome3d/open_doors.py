@@ -20,12 +20,12 @@ from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.read.mesh.obj import Mesh
 from pbrs_farm.read.sweethome3d.door_cutouts import StandingWall
 from pbrs_farm.read.sweethome3d.home_file.home_xml import PlanLevel, PlanPiece
-from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
 from pbrs_farm.read.sweethome3d.home_rooms import ReadRoom
 from pbrs_farm.read.sweethome3d.piece_items import piece_item
 from pbrs_farm.read.sweethome3d.piece_materials import piece_material
 from pbrs_farm.read.sweethome3d.piece_models import (
     HINGE,
+    HomeMaterials,
     PieceModels,
     Transformations,
     hangs_on,

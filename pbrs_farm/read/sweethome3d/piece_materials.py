@@ -10,8 +10,15 @@ from pbrs_farm.read.common.model_materials import BLACK, GREY, WHITE
 from pbrs_farm.read.mesh.mtl import ObjMaterial
 from pbrs_farm.read.mesh.obj import Mesh
 from pbrs_farm.read.sweethome3d.home_file.home_xml import Paint, PlanPicture, PlanPiece
-from pbrs_farm.read.sweethome3d.home_materials import SHININESS_SCALE, HomeMaterials
-from pbrs_farm.read.sweethome3d.piece_models import LIGHT, MIRROR, PANE, PieceModel, content_name
+from pbrs_farm.read.sweethome3d.piece_models import (
+    LIGHT,
+    MIRROR,
+    PANE,
+    SHININESS_SCALE,
+    HomeMaterials,
+    PieceModel,
+    content_name,
+)
 
 CLEAR = 0.95  # Opacity below which a material counts as glass
 

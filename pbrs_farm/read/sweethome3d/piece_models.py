@@ -1,4 +1,4 @@
-"""Models named by a home -> meshes per material with a role; each is parsed once; no effects."""
+"""Models and materials of a home: meshes per material with a role; each is parsed once; no effects."""
 
 from __future__ import annotations
 
@@ -12,9 +12,53 @@ import numpy as np
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import is_flattening
+from pbrs_farm.core.house import Material
+from pbrs_farm.read.common.material_library import LoadedTexture, MaterialLibrary
+from pbrs_farm.read.common.notes import Notes
+from pbrs_farm.read.common.source_files import Resources
 from pbrs_farm.read.mesh.mtl import ObjMaterial, builtin_materials, laid, parse_mtl
 from pbrs_farm.read.mesh.obj import Mesh, ObjModel, parse_obj
-from pbrs_farm.read.sweethome3d.home_materials import HomeMaterials
+from pbrs_farm.read.sweethome3d.home_file.home_xml import Paint
+
+SHININESS_SCALE = 128.0  # Phong exponent of the program's shininess 1
+
+
+class HomeMaterials:
+    """Resolves paints and textures of one home (or of the program) into its material library."""
+
+    def __init__(self, contents: Resources, notes: Notes) -> None:
+        self.contents = contents
+        self.notes = notes
+        self.library = MaterialLibrary(notes)
+
+    def texture(self, name: str, place: str) -> LoadedTexture | None:
+        """The texture of that content name, or None with a note if it cannot be used."""
+        return self.library.texture(
+            name,
+            name=posixpath.basename(name),
+            place=place,
+            load=lambda: self.contents.read(posixpath.normpath(name)),
+        )
+
+    def painted(self, paint: Paint, name: str, place: str) -> int:
+        """Index of a paint's material: its picture, else its colour, else white marked as default."""
+        # A picture that can be used goes before the colour.
+        loaded = None
+        if paint.picture is not None:
+            loaded = self.texture(paint.picture.image, place)
+        shine = min(max(paint.shininess or 0.0, 0.0), 1.0)
+        colour = paint.colour if loaded is None else None
+        return self.library.index(
+            Material(
+                name=name,
+                diffuse=colour or (1.0, 1.0, 1.0),
+                specular=(shine, shine, shine),
+                shininess=shine * SHININESS_SCALE,
+                texture_id=None if loaded is None else loaded.texture.id,
+                is_default=loaded is None and paint.colour is None,
+            )
+        )
+
 
 _JOINT = re.compile(r"(?:^|_)((?:hinge|rail)_\d+|unique_rail)(?:_|$)")
 

@@ -13,7 +13,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.joints import JointKind
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.gltf.document import UNREAD
-from pbrs_farm.read.gltf.node_joints import KEY, joint_row
+from pbrs_farm.read.gltf.scene_writer import KEY, joint_row
 
 _AXES: Final = {"X": (1.0, 0.0, 0.0), "Y": (0.0, 1.0, 0.0), "Z": (0.0, 0.0, 1.0)}
 _LEAST_DETERMINANT: Final = 0.1  # of a turn; of a mirrored, flattened or unknown frame it is less

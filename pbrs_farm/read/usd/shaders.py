@@ -15,10 +15,14 @@ from pxr import Sdf, UsdShade
 
 from pbrs_farm.core.frames import linear_from_srgb
 from pbrs_farm.read.common.material_fields import noted_fields
-from pbrs_farm.read.common.material_library import PANE_OPACITY, picture_with_alpha
+from pbrs_farm.read.common.material_library import (
+    PANE_OPACITY,
+    PictureValues,
+    picture_of_values,
+    picture_with_alpha,
+)
 from pbrs_farm.read.common.model_materials import GREY
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.picture_values import PictureValues, picture_of_values
 from pbrs_farm.read.gltf.document import UNREAD
 from pbrs_farm.read.usd.surface_shaders import WRAPS, SurfaceWords, is_picture, surface_of
 

@@ -18,7 +18,7 @@ from pxr import Ar, Sdf, Tf, Usd, UsdUtils
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.operating_system import MEMORY_LIMIT, has_crashed
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import RootFolder
 from pbrs_farm.regular_files import MAX_SCENE_BYTES, real_path
 
 LAYERS: Final = (".usd", ".usda", ".usdc", ".usdz")

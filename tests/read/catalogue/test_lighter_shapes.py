@@ -9,7 +9,7 @@ from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.house import Material
 from pbrs_farm.core.mesh import face_areas, triangle_corners
 from pbrs_farm.geometry.solids import box, sphere
-from pbrs_farm.read.catalogue.lighter_shapes import lighter_shape
+from pbrs_farm.read.catalogue.library_shapes import lighter_shape
 
 
 def _ball(n: int = 160) -> Shape:

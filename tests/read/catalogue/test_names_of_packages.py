@@ -14,7 +14,7 @@ import pytest
 
 from pbrs_farm.assets import furniture_package
 from pbrs_farm.core.classes import NYU40_NAMES, OTHERPROP
-from pbrs_farm.read.catalogue.property_files import numbered_entries, parse_properties
+from pbrs_farm.read.catalogue.library_files import numbered_entries, parse_properties
 from pbrs_farm.read.common.furniture_classes import PieceSize, class_of_piece, nyu40_of
 from tests.example_homes import example_homes
 

@@ -1,6 +1,6 @@
 from __future__ import annotations
 
-from pbrs_farm.read.catalogue.property_files import numbered_entries, parse_properties
+from pbrs_farm.read.catalogue.library_files import numbered_entries, parse_properties
 
 
 def test_a_property_file_is_read_as_java_reads_it() -> None:

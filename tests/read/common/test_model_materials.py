@@ -9,7 +9,7 @@ import pytest
 from pbrs_farm.core.house import Material, MaterialKind
 from pbrs_farm.read.common.model_materials import GREY, WHITE, ModelMaterials
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.root_folder import RootFolder
+from pbrs_farm.read.common.source_files import RootFolder
 from pbrs_farm.read.mesh.mtl import ObjMaterial
 from tests.read.small_houses import png
 

@@ -8,7 +8,7 @@ import pytest
 
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.read.common.room_limits import MAX_OVERLAPS, MAX_ROOMS, check_outlines
+from pbrs_farm.read.common.rooms import MAX_OVERLAPS, MAX_ROOMS, check_outlines
 from pbrs_farm.read.gltf.scene import Beside, read_gltf
 from pbrs_farm.read.suncg.suncg_house import read_suncg
 from tests.read.gltf.gltf_scenes import Scene, two_rooms

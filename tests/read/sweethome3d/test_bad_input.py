@@ -16,8 +16,8 @@ from hypothesis import strategies as st
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House
 from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.sweethome3d.door_cutouts import polygons_from_path
 from pbrs_farm.read.sweethome3d.home import read_home
-from pbrs_farm.read.sweethome3d.svg_outlines import polygons_from_path
 from tests.hypothesis_profiles import examples
 from tests.read.sweethome3d.sh3d_source import BOX_OBJ, ROOM, WALLS, home_xml, piece, sh3d
 

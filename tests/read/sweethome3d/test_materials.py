@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from pbrs_farm.core.house import House, Item, ItemKind, Material, MaterialKind, Surface
-from pbrs_farm.read.builtin.builtin_pieces import checks, png_from_srgb8
+from pbrs_farm.read.builtin.builtin_home import checks, png_from_srgb8
 from pbrs_farm.read.sweethome3d.home import read_home
 from tests.read.sweethome3d.sh3d_source import BOX_OBJ, WALLS, WINDOW_OBJ, home_xml, piece, sh3d
 

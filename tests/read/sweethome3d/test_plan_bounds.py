@@ -6,7 +6,7 @@ import pytest
 
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.read.common.room_limits import MAX_OVERLAPS
+from pbrs_farm.read.common.rooms import MAX_OVERLAPS
 from pbrs_farm.read.sweethome3d.home import MAX_CROSSINGS, read_home
 from tests.read.sweethome3d.sh3d_source import ROOM, home_xml
 

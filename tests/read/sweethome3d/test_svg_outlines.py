@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import shapely
 
-from pbrs_farm.read.sweethome3d.svg_outlines import polygons_from_path
+from pbrs_farm.read.sweethome3d.door_cutouts import polygons_from_path
 
 
 def area(path: str) -> float:

@@ -13,8 +13,7 @@ from defusedxml.common import DefusedXmlException
 from defusedxml.ElementTree import fromstring
 
 from pbrs_farm.core.errors import BadHouse
-from pbrs_farm.read.common.resources import Resources, ZipResources
-from pbrs_farm.read.common.source_files import Layered
+from pbrs_farm.read.common.source_files import Layered, Resources, ZipResources
 from pbrs_farm.read.mesh.obj import ObjModel
 from pbrs_farm.read.sweethome3d.home_file.java_home import RESAVE, root_from_java
 

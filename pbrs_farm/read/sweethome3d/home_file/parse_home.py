@@ -1,22 +1,143 @@
-"""The XML tree of a home -> Plan; no effects."""
+"""The XML tree of a home -> Plan, every fault named with its file and place; no effects."""
 
 from __future__ import annotations
 
+import math
 from collections.abc import Iterator
+from dataclasses import dataclass
 from xml.etree.ElementTree import Element
 
+from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.errors import BadHouse
+from pbrs_farm.core.frames import M_FROM_CM
+from pbrs_farm.core.joints import JOINTS_PROPERTY, Joint
+from pbrs_farm.formats.serialise import value_from_json
 from pbrs_farm.read.sweethome3d.home_file.home_xml import (
+    Baseboard,
+    DoorFrame,
     HomePlan,
     HomeRoom,
     HomeWall,
+    Paint,
     PlanCamera,
     PlanLevel,
+    PlanLight,
+    PlanPicture,
+    PlanPiece,
     as_points,
 )
-from pbrs_farm.read.sweethome3d.home_file.parse_furniture import parse_piece
-from pbrs_farm.read.sweethome3d.home_file.parse_paints import baseboard_of, room_paint, wall_paint
-from pbrs_farm.read.sweethome3d.home_file.xml_attributes import Attributes
+
+Rgb = tuple[float, float, float]
+
+
+@dataclass(frozen=True, slots=True)
+class Attributes:
+    """One element's attributes."""
+
+    file: str
+    place: str  # what to call the element in a message
+    element: Element
+    max_extent_m: float  # bound of lengths and coordinates
+
+    def fail(self, message: str) -> BadHouse:
+        """The error that names the file and this element, for the caller to raise."""
+        return BadHouse(self.file, self.place, message)
+
+    def text(self, name: str, default: str = "") -> str:
+        """The attribute, unconverted."""
+        return self.element.get(name, default)
+
+    def optional(self, name: str) -> float | None:
+        """A finite number, or None if the attribute is missing or empty."""
+        text = self.element.get(name)
+        if text is None or not text.strip():
+            return None
+        try:
+            value = float(text)
+        except ValueError:
+            raise self.fail(f"{name}='{text[:40]}' is not a number") from None
+        if not math.isfinite(value):
+            raise self.fail(f"{name}='{text[:40]}' is not a finite number")
+        return value
+
+    def number(self, name: str, default: float | None = None) -> float:
+        """A finite number; without a default the attribute must be there."""
+        value = self.optional(name)
+        if value is not None:
+            return value
+        if default is None:
+            raise self.fail(f"attribute {name} is missing")
+        return default
+
+    def within(self, name: str, default: float, low: float, high: float) -> float:
+        """A finite number, drawn into low..high."""
+        return min(max(self.number(name, default), low), high)
+
+    def metres(self, name: str, default_m: float | None = None) -> float:
+        """A length or coordinate given in centimetres, in metres.
+
+        default: in metres, None = required. Raises BadHouse, naming the element, for an invalid number and
+        for one beyond read.max_extent_m.
+        """
+        value = self.optional_metres(name)
+        if value is not None:
+            return value
+        if default_m is None:
+            raise self.fail(f"attribute {name} is missing")
+        return default_m
+
+    def optional_metres(self, name: str) -> float | None:
+        """As metres, or None if the attribute is missing."""
+        value = self.optional(name)
+        if value is None:
+            return None
+        value *= M_FROM_CM
+        if abs(value) > self.max_extent_m:
+            limit = f"{self.max_extent_m:.0f} m (recipe field read.max_extent_m)"
+            raise self.fail(f"{name} is {value:.0f} m, farther than {limit}")
+        return value
+
+    def length(self, name: str, default_m: float | None = None) -> float:
+        """As metres, and not negative."""
+        value = self.metres(name, default_m)
+        if value < 0:
+            raise self.fail(f"{name} is negative")
+        return value
+
+    def flag(self, name: str, default: bool) -> bool:
+        """true or false."""
+        text = self.element.get(name)
+        return default if text is None else text.strip().lower() == "true"
+
+    def numbers(self, name: str, count: int) -> tuple[float, ...] | None:
+        """count numbers of at most 1e6 separated by spaces, or None if missing."""
+        text = self.element.get(name)
+        if text is None:
+            return None
+        try:
+            values = tuple(float(w) for w in text.split())
+        except ValueError:
+            values = ()
+        # NaN fails the comparison, too.
+        if len(values) != count or not all(abs(v) <= 1e6 for v in values):
+            raise self.fail(f"{name} must be {count} finite numbers")
+        return values
+
+    def argb(self, name: str) -> tuple[int, Rgb] | None:
+        """Alpha 0..255 and the sRGB-encoded colour in 0..1 of a hex AARRGGBB, or None."""
+        text = self.element.get(name)
+        if text is None or not text.strip():
+            return None
+        try:
+            value = int(text, 16)
+        except ValueError:
+            raise self.fail(f"{name}='{text[:40]}' is not a colour AARRGGBB") from None
+        if not 0 <= value <= 0xFFFFFFFF:
+            raise self.fail(f"{name}='{text[:40]}' is not a colour AARRGGBB")
+        # The program keeps colours as Java does: alpha, red, green, blue from the top byte.
+        r, g, b = ((value >> shift & 255) / 255 for shift in (16, 8, 0))
+        return value >> 24, (r, g, b)
+
 
 # Of the file, hidden levels included; home.py and room_floors.py say how many are read.
 MAX_PIECE_ELEMENTS = 20_000
@@ -165,4 +286,176 @@ def _parse_camera(a: Attributes, number: int) -> PlanCamera:
         yaw=a.number("yaw", 0.0),
         pitch=a.number("pitch", 0.0),
         hfov=min(max(a.number("fieldOfView", 1.1), 0.05), 3.0),
+    )
+
+
+FULL_CUT_OUT = "M0,0 v1 h1 v-1 z"  # the unit square: the whole opening
+
+
+def parse_piece(a: Attributes, level: str, group: str = "") -> PlanPiece:
+    """A piece by its XML element, of a level (its own or its group's) and a group or ""; BadHouse."""
+    element = a.element
+    return PlanPiece(
+        tag=element.tag,
+        place=a.place,
+        level=level,
+        catalogue_id=a.text("catalogId"),
+        name=a.text("name"),
+        model=a.text("model"),
+        centre=(a.metres("x"), a.metres("y")),
+        elevation=a.metres("elevation", 0.0),
+        angle=a.number("angle", 0.0),
+        pitch=a.number("pitch", 0.0),
+        roll=a.number("roll", 0.0),
+        size=(a.length("width"), a.length("depth"), a.length("height")),
+        height_in_plan=a.optional_metres("heightInPlan"),
+        is_mirrored=a.flag("modelMirrored", False),
+        rotation=a.numbers("modelRotation", 9),
+        paint=piece_paint(a),
+        materials=_materials(a),
+        transformations=_transformations(a),
+        frame=_parse_door_frame(a) if _is_opening(a) else None,
+        lights=_parse_lights(a) if element.tag == "light" else (),
+        light_materials=tuple(e.get("name", "") for e in element.findall("lightSourceMaterial")),
+        power=a.within("power", 0.5, 0.0, 10.0) if element.tag == "light" else 0.0,
+        staircase_cut_out=a.text("staircaseCutOutShape"),
+        group=group,
+        joints=_joints(a),
+    )
+
+
+def _is_opening(a: Attributes) -> bool:
+    return a.element.tag == "doorOrWindow" or a.flag("doorOrWindow", False)
+
+
+def _materials(a: Attributes) -> tuple[tuple[str, Paint], ...]:
+    materials = []
+    for element in a.element.findall("material"):
+        name = element.get("name", "")
+        inner = Attributes(a.file, f"{a.place} material '{name}'", element, a.max_extent_m)
+        materials.append((name, piece_paint(inner)))
+    return tuple(materials)
+
+
+def _transformations(a: Attributes) -> tuple[tuple[str, tuple[float, ...]], ...]:
+    transformations = []
+    for element in a.element.findall("transformation"):
+        name = element.get("name", "")
+        inner = Attributes(a.file, f"{a.place} transformation '{name}'", element, a.max_extent_m)
+        matrix = inner.numbers("matrix", 12)
+        if matrix is not None:
+            transformations.append((name, matrix))
+    return tuple(transformations)
+
+
+def _joints(a: Attributes) -> tuple[Joint, ...]:
+    for element in a.element.findall("property"):
+        if element.get("name") == JOINTS_PROPERTY:
+            place = f"{a.file}, {a.place}, {JOINTS_PROPERTY}"
+            data = json_from_bytes(element.get("value", "").encode("utf-8", "replace"), place)
+            joints = value_from_json(tuple[Joint, ...], data, place)
+            for joint in joints:
+                if not _is_unit(joint.axis) or joint.lower > joint.upper:
+                    raise BadHouse(place, joint.part[:60], "its axis or its limits are none")
+            return joints
+    return ()
+
+
+def _is_unit(axis: tuple[float, float, float]) -> bool:
+    return abs(sum(v * v for v in axis) - 1.0) < 1e-6
+
+
+def _parse_door_frame(a: Attributes) -> DoorFrame:
+    return DoorFrame(
+        cut_out=a.text("cutOutShape", FULL_CUT_OUT),
+        wall_width=a.within("wallWidth", 1.0, -1.0, 2.0),
+        wall_left=a.within("wallLeft", 0.0, -1.0, 2.0),
+        wall_height=a.within("wallHeight", 1.0, -1.0, 2.0),
+        wall_top=a.within("wallTop", 0.0, -1.0, 2.0),
+        cuts_both_sides=a.flag("wallCutOutOnBothSides", False),
+    )
+
+
+def _fraction(a: Attributes, name: str) -> float:
+    return a.within(name, 0.5, -10.0, 10.0)
+
+
+def _parse_lights(a: Attributes) -> tuple[PlanLight, ...]:
+    lights = []
+    for k, element in enumerate(a.element.findall("lightSource")):
+        inner = Attributes(a.file, f"{a.place} lightSource #{k}", element, a.max_extent_m)
+        colour = inner.argb("color")
+        lights.append(
+            PlanLight(
+                (_fraction(inner, "x"), _fraction(inner, "y"), _fraction(inner, "z")),
+                (1.0, 1.0, 1.0) if colour is None else colour[1],
+                None if inner.optional("diameter") is None else inner.within("diameter", 0, 0, 2),
+            )
+        )
+    return tuple(lights)
+
+
+def wall_paint(a: Attributes, side: str) -> Paint:
+    """The paint of a wall's "left" or "right" side, or of its "top"."""
+    if side == "top":
+        return _paint_of(a, "topColor", None, None)
+    return _paint_of(a, f"{side}SideColor", f"{side}SideTexture", f"{side}SideShininess")
+
+
+def room_paint(a: Attributes, part: str) -> Paint:
+    """The paint of a room's "floor" or "ceiling"."""
+    return _paint_of(a, f"{part}Color", f"{part}Texture", f"{part}Shininess")
+
+
+def piece_paint(a: Attributes) -> Paint:
+    """The paint that overrides a whole piece, or one of its materials."""
+    paint = _paint_of(a, "color", "", "shininess")
+    alpha = a.argb("color")
+    # A material of alpha 0 is how the program hides a part.
+    is_hidden = a.element.tag == "material" and alpha is not None and alpha[0] == 0
+    return Paint(paint.colour, paint.picture, paint.shininess, is_hidden)
+
+
+def _paint_of(a: Attributes, colour: str, texture: str | None, shininess: str | None) -> Paint:
+    argb = a.argb(colour)
+    picture = None
+    if texture is not None:
+        # A texture of a wall or room names its side, a piece's need not; the last one counts.
+        for element in a.element.findall("texture"):
+            if not texture or element.get("attribute") == texture:
+                picture = picture_of(a, element)
+    shine = a.optional(shininess) if shininess else None
+    return Paint(None if argb is None else argb[1], picture, shine)
+
+
+def picture_of(parent: Attributes, element: Element) -> PlanPicture:
+    """A <texture> element; sizes that make no sense count as one metre."""
+    name = element.get("name", "")
+    a = Attributes(parent.file, f"{parent.place} texture '{name}'", element, parent.max_extent_m)
+    width, height = a.metres("width", 1.0), a.metres("height", 1.0)
+    scale = a.number("scale", 1.0)
+    return PlanPicture(
+        image=a.text("image"),
+        name=name,
+        width=width if width > 1e-4 else 1.0,
+        height=height if height > 1e-4 else 1.0,
+        offset=(a.number("xOffset", 0.0) % 1.0, a.number("yOffset", 0.0) % 1.0),
+        angle=a.number("angle", 0.0),
+        scale=scale if scale > 1e-4 else 1.0,
+        is_fitting=a.flag("fittingArea", False),
+    )
+
+
+def baseboard_of(wall: Attributes, element: Element) -> Baseboard | None:
+    """A <baseboard> of a wall, or None if it has no size."""
+    side = element.get("attribute", "")
+    a = Attributes(wall.file, f"{wall.place} {side}", element, wall.max_extent_m)
+    thickness, height = a.length("thickness", 0.0), a.length("height", 0.0)
+    if thickness <= 0 or height <= 0:
+        return None
+    return Baseboard(
+        is_left=side.startswith("left"),
+        thickness=thickness,
+        height=height,
+        paint=_paint_of(a, "color", "", None),
     )

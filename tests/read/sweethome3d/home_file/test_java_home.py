@@ -20,7 +20,7 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.read.sweethome3d.home import read_home
 from pbrs_farm.read.sweethome3d.home_file.container import open_container
 from pbrs_farm.read.sweethome3d.home_file.home_xml import HomePlan, HomeRoom
-from pbrs_farm.read.sweethome3d.home_file.java_stream import JavaStreamError, java_objects
+from pbrs_farm.read.sweethome3d.home_file.java_home import JavaStreamError, java_objects
 from pbrs_farm.read.sweethome3d.home_file.parse_home import parse_plan
 from tests.read.sweethome3d.home_file.record_java_home import JAVA_HOME_XML, RECORD
 from tests.read.sweethome3d.sh3d_source import BOX_OBJ
