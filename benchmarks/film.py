@@ -21,7 +21,7 @@ import pbrs_farm
 import pbrs_farm.cli
 from benchmarks.figures import write_report
 from pbrs_farm.check.embree_caster import Rays
-from pbrs_farm.check.followed_points import SEEN, OtherView, follow_points
+from pbrs_farm.check.followed_points import SEEN, follow_points, partner_of
 from pbrs_farm.check.stored_mesh import triangles_from_glb
 from pbrs_farm.check.stored_view import StoredView
 from pbrs_farm.core.arrays import F32, Bools
@@ -157,7 +157,7 @@ def _followed(
     view: StoredView, rays: Rays, relation: str, motion: str, occlusion: str
 ) -> tuple[float, float]:
     """(largest error of a view's motion layer in px, share of pixels with another occlusion)."""
-    partner = OtherView.of(view, relation)
+    partner = partner_of(view, relation)
     assert partner is not None
     depth = _layer(view, "depth_z").astype(np.float64)
     rows, columns = np.nonzero(depth > 0)

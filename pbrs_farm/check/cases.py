@@ -5,7 +5,7 @@ from __future__ import annotations
 import glob
 import zlib
 from collections.abc import Callable, Iterator, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from functools import cached_property
 from pathlib import Path
 from typing import Any, NamedTuple, Protocol, TypeVar
@@ -55,35 +55,62 @@ class Scene(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class Cast:
-    """N pixels of a view and the first hits of their rays."""
+    """N rays of a view, and the triangles that they hit first or are assumed to hit."""
 
-    rays: Hits
-    rows: I64
-    columns: I64
+    scene: Scene
+    rows: NDArray[Any]
+    columns: NDArray[Any]
     origin: F64  # (3,)
     directions: F64  # (N, 3)
     face: I64  # (N,), -1 = nothing
+
+    @staticmethod
+    def of(view: StoredView, rows: NDArray[Any], columns: NDArray[Any], scene: Scene) -> Cast:
+        """The first hits of pixels' rays in a scene."""
+        origin, directions = view.rays(rows, columns)
+        face = scene.rays.first(origin, directions)
+        return Cast(scene, rows, columns, origin, directions, face)
 
     def some(self, index: NDArray[Any]) -> Cast:
         """Some of the pixels."""
         rows, columns = self.rows[index], self.columns[index]
         directions, face = self.directions[index], self.face[index]
-        return Cast(self.rays, rows, columns, self.origin, directions, face)
+        return Cast(self.scene, rows, columns, self.origin, directions, face)
+
+    def at(self, face: I64) -> Cast:
+        """The same rays, assumed to hit other triangles."""
+        return replace(self, face=face)
 
     @property
+    def hit(self) -> Bools:
+        """(N,) True for rays that hit anything."""
+        return self.face >= 0
+
+    @cached_property
     def z(self) -> F64:
         """(N,) distance of the hits in lengths of directions."""
-        return self.rays.distance(self.face, self.origin, self.directions)
+        return self.scene.rays.distance(self.face, self.origin, self.directions)
 
-    @property
+    @cached_property
     def point(self) -> F64:
         """(N, 3) the hits."""
         return np.asarray(self.origin + self.directions * self.z[:, None])
 
-    @property
+    @cached_property
     def normal(self) -> F64:
         """(N, 3) unit normals of the faces, towards the camera."""
-        return self.rays.normal(self.face, self.directions)
+        return self.scene.rays.normal(self.face, self.directions)
+
+    @property
+    def instance(self) -> I64:
+        """(N,) instances, 0 = nothing."""
+        return self.of_face(self.scene.triangles.instance)
+
+    def of_face(self, table: NDArray[Any]) -> NDArray[Any]:
+        """(N,) table[face], 0 where face is -1."""
+        if not len(table):
+            return np.zeros(len(self.face), table.dtype)
+        return np.where(self.hit, table[self.face], table.dtype.type(0))
 
     def __len__(self) -> int:
         return len(self.face)
@@ -237,11 +264,9 @@ class ViewCase:
         """Reports facts of a check, about the view or a file of it."""
         return self.tally.at(check, f"{self.place}/{file}".rstrip("/"))
 
-    def cast(self, rows: I64, columns: I64) -> Cast:
+    def cast(self, rows: NDArray[Any], columns: NDArray[Any]) -> Cast:
         """The first hits of pixels' rays among all triangles."""
-        origin, directions = self.view.rays(rows, columns)
-        face = self.now.rays.first(origin, directions)
-        return Cast(self.now.rays, rows, columns, origin, directions, face)
+        return Cast.of(self.view, rows, columns, self.scene)
 
     def sample(self, n_pixels: int | None) -> Pixels:
         """Rows and columns of all pixels, or of a sample that the view's name fixes."""

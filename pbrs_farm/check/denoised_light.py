@@ -9,8 +9,8 @@ import numpy as np
 
 from pbrs_farm.check.cases import Channels
 from pbrs_farm.check.certificate import Tally
+from pbrs_farm.check.developing import halved
 from pbrs_farm.check.stored_view import StoredView
-from pbrs_farm.check.tiles import halved
 from pbrs_farm.core.arrays import F32
 
 Planes = dict[str, F32]  # outdoor, indoor, albedo and normal, each (H, W, 3)

@@ -1,8 +1,8 @@
-"""An independent ray caster: Embree finds the triangle, float64 its distance and normal; holds an Embree scene."""
+"""An independent ray caster: Embree finds the triangle, float64 its distance and normal, also behind mirrors; holds an Embree scene."""
 
 from __future__ import annotations
 
-from typing import Any, Protocol
+from typing import Any, NamedTuple, Protocol
 
 import numpy as np
 import trimesh
@@ -13,6 +13,9 @@ from pbrs_farm.core.arrays import F64, I64, Bools
 
 _MOST_SHEETS = 64  # triangles with holes that a ray may pass, before it meets a solid one
 _STEP = 1e-5  # behind a hole, relative to the largest coordinate plus 1 m: above float32's rounding
+_MOST_REFLECTIONS = 8  # reflections; the next mirror counts as the hit
+_LEAST_COSINE = 0.02  # between a shading normal and the way back, to which it is bent
+_OFF = 2e-5  # distance off a mirror, relative to the largest coordinate plus 1 m
 
 
 class Hits(Protocol):
@@ -149,3 +152,78 @@ class _Embree:
         local = np.asarray(self._caster.intersects_first(origins, directions), np.int64)
         # A pixel outside a fisheye's circle has no ray: its direction is 0.
         return np.where((local >= 0) & directions.any(1), self._face[local], -1)
+
+
+class _Path(NamedTuple):
+    """N rays behind their last mirror."""
+
+    face: I64
+    way: F64  # until the last mirror, in lengths of directions
+    origin: F64  # (N, 3) on the last mirror
+    directions: F64  # (N, 3)
+    mirrors: list[F64]  # (N, 3) normals of each reflection's mirrors; 0 = no mirror
+
+
+class MirrorRays:
+    """First hits of an eye's rays, through mirrors: distances of the whole way, normals of the image."""
+
+    def __init__(self, triangles: Triangles, rays: Rays, eye: F64) -> None:
+        """rays: of all triangles."""
+        self._triangles, self._rays, self._eye = triangles, rays, eye
+
+    def first(self, origin: F64, directions: F64) -> I64:
+        """As Rays, behind the mirrors."""
+        return self._path(origin, directions).face
+
+    def distance(self, face: I64, origin: F64, directions: F64) -> F64:
+        """(N,) the whole way to each face's plane; 0 where face is -1."""
+        path = self._path(origin, directions)
+        t = self._rays.distance(face, path.origin, path.directions)
+        return np.where(face >= 0, path.way + t, 0.0)
+
+    def normal(self, face: I64, directions: F64) -> F64:
+        """(N, 3) unit normals of the images; 0 where face is -1."""
+        path = self._path(self._eye, directions)
+        normal = self._rays.normal(face, path.directions)
+        for n in reversed(path.mirrors):
+            normal = normal - 2 * dot(normal, n)[:, None] * n
+        return normal
+
+    def without_holes(self, face: I64, origin: F64, directions: F64) -> I64:
+        """As Rays, behind the mirrors."""
+        path = self._path(origin, directions)
+        return self._rays.without_holes(face, path.origin, path.directions)
+
+    def last_leg(self, origin: F64, directions: F64) -> tuple[F64, F64, F64]:
+        """As Rays: from the last mirrors."""
+        path = self._path(origin, directions)
+        return path.origin, path.directions, path.way
+
+    def _path(self, eye: F64, directions: F64) -> _Path:
+        origin, d = np.broadcast_to(eye, directions.shape).copy(), directions.copy()
+        way = np.zeros(len(directions))
+        face = self._rays.first(origin, d)
+        mirrors: list[F64] = []
+        for _ in range(_MOST_REFLECTIONS):
+            on = np.nonzero((face >= 0) & (self._triangles.kinds_of(face) == "mirror"))[0]
+            if not len(on):
+                break
+            t = self._rays.distance(face[on], origin[on], d[on])
+            point = origin[on] + t[:, None] * d[on]
+            flat = self._rays.normal(face[on], d[on])
+            n = self._triangles.shading_normals(face[on], point, flat)
+            unit = d[on] / np.linalg.norm(d[on], axis=1, keepdims=True)
+            cosine = -dot(n, unit)[:, None]
+            bent = n + (cosine - _LEAST_COSINE) * unit
+            bent /= np.linalg.norm(bent, axis=1, keepdims=True)
+            n = np.where(cosine < _LEAST_COSINE, bent, n)
+            mirror = np.zeros(directions.shape)
+            mirror[on] = n
+            mirrors.append(mirror)
+            d[on] = d[on] - 2 * dot(n, d[on])[:, None] * n
+            way[on] += t
+            origin[on] = point
+            away = dot(d[on], flat) > 0
+            step = _OFF * (1 + np.abs(point).max(axis=1, keepdims=True))
+            face[on] = np.where(away, self._rays.first(point + step * flat, d[on]), -1)
+        return _Path(face, way, origin, d, mirrors)

@@ -7,10 +7,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from pbrs_farm.check.axes import into_frame
 from pbrs_farm.check.cases import Pixels
 from pbrs_farm.check.embree_caster import Hits, is_visible
-from pbrs_farm.check.lens_rays import StoredLens
+from pbrs_farm.check.lens_rays import PlacedCamera, StoredCamera
 from pbrs_farm.check.stored_view import StoredView
 from pbrs_farm.core.arrays import F64, I64, Bools
 
@@ -28,52 +27,16 @@ def stay(points: F64) -> F64:
     return points
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class OtherView:
-    """The partner's camera, by the view's own table."""
-
-    k: F64  # (3, 3)
-    world_from_camera: F64  # (4, 4), OpenCV axes
-    size: tuple[int, int]  # height, width
-    lens: StoredLens | None = None  # the same for all views of a run
-
-    @staticmethod
-    def of(view: StoredView, relation: str) -> OtherView | None:
-        """The partner of that relation in view.json, or None; KeyError or ValueError for a damaged row."""
-        row = view.table.get("partners", {}).get(relation)
-        if row is None:
-            return None
-        pose = np.array(row["world_from_camera_opencv"], np.float64)
-        return OtherView(np.array(row["K"], np.float64), pose, view.size, view.lens)
-
-    @property
-    def eye(self) -> F64:
-        """(3,) the camera's position."""
-        return self.world_from_camera[:3, 3]
-
-    def pixels(self, points: F64) -> tuple[F64, F64]:
-        """(N, 2) px of world points (N, 3), and (N,) their depth; NaN behind the camera.
-
-        Depth is z for a pinhole, else as the lens's layers store it. A point less than 1 mm
-        before a pinhole counts as behind.
-        """
-        local = into_frame(self.world_from_camera, points)
-        if self.lens is not None:
-            plane, depth = self.lens.plane_and_depth(local)
-            return plane * self.k[[0, 1], [0, 1]] + self.k[:2, 2], depth
-        z = local[:, 2]
-        homogeneous = local @ self.k.T
-        with np.errstate(divide="ignore", invalid="ignore"):
-            px = homogeneous[:, :2] / homogeneous[:, 2:]
-        return np.where(z[:, None] > 1e-3, px, np.nan), z
-
-    def margin(self, px: F64) -> F64:
-        """(N,) distance in px of points (N, 2) inside the picture's border."""
-        with np.errstate(invalid="ignore"):
-            return np.asarray(np.minimum(px, np.array(self.size[::-1]) - px).min(axis=1))
+def partner_of(view: StoredView, relation: str) -> PlacedCamera | None:
+    """The partner of that relation in view.json, or None; KeyError or ValueError for a damaged row."""
+    row = view.table.get("partners", {}).get(relation)
+    if row is None:
+        return None
+    pose = np.array(row["world_from_camera_opencv"], np.float64)
+    return PlacedCamera(np.array(row["K"], np.float64), pose, view.size, view.lens)
 
 
-def is_seen(points: F64, other: OtherView, rays: Hits, slack_m: float = 0) -> Bools:
+def is_seen(points: F64, other: StoredCamera, rays: Hits, slack_m: float = 0) -> Bools:
     """(N,) True if nothing is between the other eye and a point, beyond the error of 32-bit rays."""
     distance = np.linalg.norm(points - other.eye, axis=1)
     return is_visible(rays, other.eye, points, slack_m + _REACH * (1 + distance))
@@ -88,7 +51,7 @@ class Followed:
 
 
 def follow_points(
-    view: StoredView, other: OtherView, pixels: Pixels, z: F64, rays: Hits, carry: Carry = stay
+    view: StoredView, other: StoredCamera, pixels: Pixels, z: F64, rays: Hits, carry: Carry = stay
 ) -> Followed:
     """Follow the surfaces at depth z (N,) metres behind pixels' centres into the other picture.
 
@@ -103,7 +66,7 @@ def follow_points(
 
 
 def near_edge(
-    view: StoredView, other: OtherView, pixels: Pixels, z: F64, rays: Hits, carry: Carry = stay
+    view: StoredView, other: StoredCamera, pixels: Pixels, z: F64, rays: Hits, carry: Carry = stay
 ) -> Bools:
     """(N,) True near the other picture's border or an obstacle, where another state is right, too; five casts."""
     rows, columns = pixels
@@ -118,7 +81,7 @@ def near_edge(
 
 
 def _points_of(
-    view: StoredView, other: OtherView, pixels: Pixels, z: F64, carry: Carry
+    view: StoredView, other: StoredCamera, pixels: Pixels, z: F64, carry: Carry
 ) -> tuple[F64, F64, F64]:
     """(N, 3) surface points, their (N, 2) px in the other picture, (N,) px inside its border."""
     origin, directions = view.rays(*pixels)

@@ -13,18 +13,20 @@ from scipy import ndimage
 
 from pbrs_farm.check.cases import FormCase
 from pbrs_farm.check.checks import Check
-from pbrs_farm.check.form_truth import FormTruth, mask_from_runs
-from pbrs_farm.check.rules import judge
-from pbrs_farm.check.stored_files import stored_bytes, stored_object
-from pbrs_farm.check.stored_set import MODES, PACKED
-from pbrs_farm.check.trainer_forms import (
+from pbrs_farm.check.form_truth import (
     Z_UP,
+    FormTruth,
     camera_matrix,
     covisibility,
+    mask_from_runs,
     metres_of_logarithms,
     wanted_matrix,
     whole_centres,
 )
+from pbrs_farm.check.plan import polygon_area
+from pbrs_farm.check.rules import judge
+from pbrs_farm.check.stored_files import stored_bytes, stored_object
+from pbrs_farm.check.stored_set import MODES, PACKED
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.images import array_from_png, decode_photo, layers_from_exr
@@ -193,7 +195,7 @@ def _check_polygons(
         rings = [
             np.reshape(c, (-1, 2)) * np.array(mask.shape[::-1]) for k, c in shapes if k == number
         ]
-        area = sum(map(_area, rings))
+        area = sum(map(polygon_area, rings))
         inner = ndimage.binary_erosion(mask)
         fits = abs(area - mask.sum()) <= (mask & ~inner).sum() + 4
         expect(fits, f"class {number} covers {area:.0f} px, in the view {mask.sum()}")
@@ -201,11 +203,6 @@ def _check_polygons(
         corners = np.concatenate(rings or [np.zeros((0, 2))])
         columns, lines = np.clip(corners.astype(int), 0, np.array(mask.shape[::-1]) - 1).T
         expect(bool(near[lines, columns].all()), f"class {number} has corners off its pixels")
-
-
-def _area(ring: NDArray[Any]) -> float:
-    x, y = ring.T
-    return abs(float((x * np.roll(y, -1) - np.roll(x, -1) * y).sum())) / 2
 
 
 def check_coco(case: FormCase) -> None:

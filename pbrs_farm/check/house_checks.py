@@ -12,11 +12,11 @@ from pbrs_farm.check.cases import HouseCase
 from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.checks import Check
 from pbrs_farm.check.colours import linear_from_srgb
+from pbrs_farm.check.plan import polygon_area
 from pbrs_farm.check.rules import judge
 from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_mesh import json_of_glb
 from pbrs_farm.core import keys
-from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.classes import NYU40_NAMES, WINDOW
 
 _STEP_M = 1.5  # maximum height of a sunken or raised floor over its level
@@ -173,12 +173,6 @@ def _check_rooms(house: StoredHouse, tally: Tally) -> None:
         if house.repair and expect(row is not None, "is not in repair.json"):
             area = polygon_area(np.array(room["polygon"], np.float64))
             judge("repaired room", place, tally, row=row, room=room, area=area)
-
-
-def polygon_area(points: F64) -> float:
-    """Area in m2 of a simple polygon (N, 2), as the sum of its trapezia."""
-    x, z = points.T
-    return float(abs((x * np.roll(z, -1) - np.roll(x, -1) * z).sum()) / 2)
 
 
 def _check_openings(house: StoredHouse, tally: Tally) -> None:

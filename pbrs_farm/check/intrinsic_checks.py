@@ -13,9 +13,9 @@ from pbrs_farm.check.certificate import Expect
 from pbrs_farm.check.checks import Check
 from pbrs_farm.check.colours import has_channels, linear_from_srgb, rgb_of
 from pbrs_farm.check.denoised_light import Planes, denoised_light, stored_light
+from pbrs_farm.check.developing import tile_means
 from pbrs_farm.check.lit_checks import LitScene
 from pbrs_farm.check.radiance_checks import is_amid
-from pbrs_farm.check.tiles import tile_means
 from pbrs_farm.core.arrays import F64
 
 _GROUPS: Final = {

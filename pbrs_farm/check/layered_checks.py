@@ -156,13 +156,11 @@ def _surfaces_of(case: ViewCase, faces: I64, origin: F64, directions: F64) -> tu
     slant_mm = np.minimum(
         _SLANT_MM * np.where(is_hit, t, 0) / np.maximum(cosine, 1e-9), _MOST_SLANT_MM
     )
-    classes = np.zeros(max(triangles.nyu40, default=0) + 1)
-    classes[list(triangles.nyu40)] = list(triangles.nyu40.values())
     instance = np.where(is_hit, triangles.instance[faces], 0)
     surfaces = _Surfaces(
         np.where(is_hit, np.clip(1000 * t, 1, _SATURATED_MM), 0),
         instance.astype(np.float64),
-        classes[instance],
+        triangles.classes[instance].astype(np.float64),
         np.where(is_hit & triangles.see_through[faces], 255.0, 0.0),
     )
     order = np.argsort(t, axis=1, kind="stable")

@@ -1,4 +1,4 @@
-"""Rays and projections of lenses, written again for `verify` from the published formulas; no effects.
+"""Rays and projections of cameras and lenses, written again for `verify` from the published formulas; no effects.
 
 Shares no code with the stages. OpenCV's documentation gives radtan, opencv and fisheye; they are inverted by
 bisection of the radius and by fixed-point steps for the tangential and prism parts.
@@ -10,7 +10,9 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from pbrs_farm.check.axes import into_frame
 from pbrs_farm.core.arrays import F64
 
 _BENT = ("radtan", "opencv")  # pinholes with distortion
@@ -204,3 +206,67 @@ def _cube_plane(points: F64) -> F64:
     for k, (inside, u, v) in faces.items():
         out[inside] = np.stack([u + 2 * k, v], axis=1)[inside]
     return out
+
+
+class StoredCamera:
+    """A camera by stored numbers."""
+
+    k: F64  # (3, 3) K
+    world_from_camera: F64  # (4, 4) pose with OpenCV axes (x right, y down, z forward)
+    size: tuple[int, int]  # (height, width) in pixels
+    lens: StoredLens | None  # None for a pinhole
+
+    @property
+    def eye(self) -> F64:
+        """(3,) the camera's position."""
+        return self.world_from_camera[:3, 3]
+
+    def pixels_and_depths(self, camera: F64) -> tuple[F64, F64]:
+        """(N, 2) pixels and (N,) depths of points (N, 3) with OpenCV's axes; NaN where not visible."""
+        if self.lens is not None:
+            plane, depth = self.lens.plane_and_depth(camera)
+        else:
+            depth = np.where(camera[:, 2] > 0, camera[:, 2], np.nan)
+            plane = camera[:, :2] / depth[:, None]
+        pixel = np.concatenate([plane, np.ones((len(plane), 1))], axis=1) @ self.k.T
+        return pixel[:, :2], depth
+
+    def pixels(self, points: F64) -> tuple[F64, F64]:
+        """The same of world points (N, 3); one less than 1 mm before a pinhole has no pixel."""
+        pixel, depth = self.pixels_and_depths(into_frame(self.world_from_camera, points))
+        if self.lens is None:
+            with np.errstate(invalid="ignore"):
+                pixel = np.where(depth[:, None] > 1e-3, pixel, np.nan)
+        return pixel, depth
+
+    def margin(self, px: F64) -> F64:
+        """(N,) distance in px of points (N, 2) inside the picture's border."""
+        with np.errstate(invalid="ignore"):
+            return np.asarray(np.minimum(px, np.array(self.size[::-1]) - px).min(axis=1))
+
+    def ray_grid(self) -> F64:
+        """(H, W, 3) the directions of `rays` through all pixels."""
+        height, width = self.size
+        rows, columns = (g.reshape(-1) for g in np.mgrid[0:height, 0:width])
+        return self.rays(rows, columns)[1].reshape(height, width, 3)
+
+    def rays(self, rows: NDArray[Any], columns: NDArray[Any]) -> tuple[F64, F64]:
+        """Origin (3,) and directions (N, 3) of unit depth through (column + 0.5, row + 0.5), in the world.
+
+        Depth is as the view stores it, along the axis or along the ray; (0, 0, 0) is no ray.
+        """
+        pixel = np.stack([columns + 0.5, rows + 0.5, np.ones(len(rows))], axis=1)
+        camera = np.linalg.solve(self.k, pixel.T).T
+        if self.lens is not None:
+            camera = self.lens.rays(np.asarray(camera[:, :2], np.float64))
+        return self.eye, camera @ self.world_from_camera[:3, :3].T
+
+
+@dataclass(frozen=True, eq=False)
+class PlacedCamera(StoredCamera):
+    """A camera that another file describes than its own view.json."""
+
+    k: F64
+    world_from_camera: F64
+    size: tuple[int, int]
+    lens: StoredLens | None = None

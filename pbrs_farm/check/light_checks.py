@@ -1,4 +1,4 @@
-"""Pictures in the light modes: radiance.exr denoised, balanced and toned again. Effects: reads files."""
+"""Pictures in the light modes: radiance.exr denoised, balanced and toned again; views without light. Reads files."""
 
 from __future__ import annotations
 
@@ -13,19 +13,21 @@ from scipy import ndimage
 from pbrs_farm.check.cases import ViewCase
 from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.checks import Check
+from pbrs_farm.check.colours import LM_PER_W, has_channels, luminance_of
 from pbrs_farm.check.denoised_light import Planes, stored_light
 from pbrs_farm.check.developing import (
     SAME_LEVEL,
     add_glare,
     exposure_of,
     finite_light,
+    halved,
     sensor_unit,
+    tile_means,
     toned,
     white_balance,
 )
 from pbrs_farm.check.stored_view import StoredView
-from pbrs_farm.check.tiles import halved, tile_means
-from pbrs_farm.core.arrays import F32
+from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.picture_cameras import PictureCamera
 from pbrs_farm.core.recipe import Recipe
 
@@ -39,6 +41,9 @@ _LEAST_HALVED_PX = 160  # a shorter side has few tiles at half the size, and cos
 _FACTOR = 0.002  # tolerance of exposure and gains
 _HALVED_FACTOR = 0.2  # the same at half the size: with 2 samples a pixel the error is up to 0.08
 _TIE, _HALVED_TIE = 1e-6, 0.02  # relative precision of a level, and at half the size
+_BLACK_CD_M2 = 0.05
+_DARK_LX = 1.0
+_GRID = 8  # of a picture, across and down
 
 
 def check_developed(case: ViewCase) -> None:
@@ -215,4 +220,40 @@ class _Shot:
         self.case.expect(check, self.file)(share >= _TILES, fault)
 
 
-CHECKS = (Check("light developed", "view", check_developed, 23, ("radiance",)),)
+def check_darkness(case: ViewCase) -> None:
+    """A picture fails if all light together leaves it black; a room below 1 lx is noted."""
+    hit = case.arrays["valid"] > 0
+    if has_channels(case.light, hit.shape, "outdoor indoor") and hit.any():
+        planes = [np.nan_to_num(luminance_of(case.light, g)) for g in ("outdoor", "indoor")]
+        fault = f"all light together leaves nine tenths of it below {_BLACK_CD_M2:g} cd/m2"
+        level = _ninth_tenth(LM_PER_W * (planes[0] + planes[1]), hit)
+        case.expect("black pictures")(level >= _BLACK_CD_M2, fault)
+    room = str(case.view.table.get("room", ""))
+    lux = _lux_of_rooms(case.house.illuminance).get(room)
+    if lux is not None and lux < _DARK_LX:
+        note = f"is in room {room}, which has {lux:.2g} lx by all light"
+        case.tally.note(f"{case.place} {note}")
+
+
+def _ninth_tenth(level: F64, hit: NDArray[Any]) -> float:
+    """90th percentile of the mean levels of the tiles that hit something."""
+    rows, columns = (np.arange(n) * _GRID // n for n in level.shape)
+    tile = (rows[:, None] * _GRID + columns)[hit]
+    n = np.bincount(tile)
+    means = np.bincount(tile, level[hit])[n > 0] / n[n > 0]
+    return float(np.quantile(means, 0.9))
+
+
+def _lux_of_rooms(document: dict[str, Any]) -> dict[str, float]:
+    """Room id -> lx on its floor by all light; {} where illuminance.json is missing or damaged."""
+    try:
+        rows = document["rooms"]
+        return {str(r["room"]): float(r["outdoor_lx"]) + float(r["indoor_lx"]) for r in rows}
+    except (ValueError, KeyError, TypeError):
+        return {}
+
+
+CHECKS = (
+    Check("light developed", "view", check_developed, 23, ("radiance",)),
+    Check("darkness", "view", check_darkness, 22, ("radiance",)),
+)

@@ -25,7 +25,7 @@ from pbrs_farm.check.checks import Check
 from pbrs_farm.check.colours import LM_PER_W, has_channels, luminance_of
 from pbrs_farm.check.embree_caster import Rays
 from pbrs_farm.check.lamp_checks import flux_lm
-from pbrs_farm.check.plan import is_within, points_in_plan
+from pbrs_farm.check.plan import is_within, points_in_plan, polygon_area
 from pbrs_farm.check.radiance_checks import COAT, coated_materials, is_amid, matte_items
 from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_mesh import Triangles
@@ -372,8 +372,6 @@ def _lamps_elsewhere(case: ViewCase, room: Mapping[str, Any], seen: F64) -> tupl
     floor, some of it more than once; one that mostly they see lights them directly.
     """
     scene = case.now.shared(LitScene)
-    x, z = np.array(room["polygon"], np.float64).T
-    area = abs(float(x @ np.roll(z, 1) - z @ np.roll(x, 1))) / 2
     grid = points_in_plan(room["polygon"], _FLOOR_GRID // 2, room["floor_y"] + _FLOOR_M)
     if not len(grid):
         return 0.0, 0.0
@@ -383,6 +381,7 @@ def _lamps_elsewhere(case: ViewCase, room: Mapping[str, Any], seen: F64) -> tupl
         if scene.sees(lamp, grid).any() and scene.sees(lamp, seen).mean() < _SEEN
     )
     less = _UNEVEN * (scene.lux_of_lamps(seen) - scene.lux_of_lamps(grid))
+    area = polygon_area(np.array(room["polygon"], np.float64))
     return _BOUNCES * hidden / area, max(less, 0.0)
 
 

@@ -1,9 +1,9 @@
-"""Flow, disparity and occlusion against points followed from one stored view to another; no effects."""
+"""Motions of house.json, the positions that follow from them, and points followed from view to view; no effects."""
 
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from functools import partial
 from typing import Any
 
@@ -12,23 +12,81 @@ import numpy as np
 from pbrs_farm.check.cases import Cast, HouseCase, Layers, Scenes, ViewCase
 from pbrs_farm.check.checks import Check
 from pbrs_farm.check.embree_caster import Rays
-from pbrs_farm.check.followed_points import SEEN, Followed, OtherView, follow_points, near_edge
+from pbrs_farm.check.followed_points import SEEN, Followed, follow_points, near_edge, partner_of
+from pbrs_farm.check.lens_rays import StoredCamera
+from pbrs_farm.check.moved_house import body_pose, joint_value
 from pbrs_farm.check.pixel_checks import of_another_part
 from pbrs_farm.check.rules import judge
 from pbrs_farm.check.stored_view import StoredView
 from pbrs_farm.core.arrays import F64, I64, Bools
 
+_UNIT = 1e-6  # tolerance of joint limits and of a quaternion's length
+_FARTHEST_M = 1e4  # of a pivot from the origin
 _SCENE_FLOW_M = 5e-5  # vertices of both times are 32-bit floats
 _FLOW_PX = 0.02  # beside half a step of the stored type
 _KITTI_REACH_PX = 511.9  # largest motion that KITTI's 16 bits hold
 _SAME = 1e-9  # of the axes of two cameras of a pair
-
 # Relation -> layers of flow, of its KITTI form and of occlusion.
 _LAYERS = {
     "next": ("flow_forward", "flow_forward_kitti", "occlusion_forward", "scene_flow"),
     "previous": ("flow_backward", "flow_backward_kitti", "occlusion_backward"),
     "stereo": ("disparity", "occlusion_stereo"),
 }
+
+
+def check_motions(case: HouseCase) -> None:
+    """Motions belong to an item or joint, their times ascend, and joints stay within their limits."""
+    items = {str(row["id"]): row for row in case.house.items.values()}
+    names = set()
+    for motion in case.house.house.get("motions", []):
+        part, name = motion["part"], (motion["item"], motion["part"])
+        expect = case.expect("motions", f"motion of {motion['item']}/{part}")
+        row = items.get(str(motion["item"]), {})
+        joint = {j["part"]: j for j in row.get("joints", [])}.get(part)
+        exists = bool(row) and (joint is not None or not part)
+        is_first = name not in names
+        names.add(name)
+        if not expect(exists and is_first, "has no moving part"):
+            continue
+        times, values = np.array(motion["times_s"]), np.array(motion["values"], np.float64)
+        shaped = values.shape == (len(times), 1 if part else 7) and len(times) > 0
+        ascends = shaped and (np.diff(times) > 0).all() and np.isfinite(values).all()
+        if not expect(ascends, "has invalid times or values"):
+            continue
+        if joint is not None:
+            low, high = joint["lower"] - _UNIT, joint["upper"] + _UNIT
+            expect(((values >= low) & (values <= high)).all(), "leaves the joint's limits")
+        else:
+            off = np.abs(np.linalg.norm(values[:, 3:], axis=1) - 1).max()
+            expect(off <= _UNIT, "has an invalid rotation")
+            off = np.abs(np.array(motion["pivot"], np.float64)).max()
+            expect(off < _FARTHEST_M, "turns about a place far away")
+
+
+def check_motion_table(case: ViewCase) -> None:
+    """The table "motion" of view.json follows from house.json's motions at the view's time."""
+    motions = case.house.house.get("motions", [])
+    table, time_s = case.view.table.get("motion"), case.view.table.get("time_s")
+    moves = bool(motions) and time_s is not None
+    fault = "lacks its motions" if moves else "has motions, but nothing moves"
+    expect = case.expect("motions")
+    if not expect((table is not None) == moves, fault) or table is None or time_s is None:
+        return
+    instances = {str(row["id"]): k for k, row in case.house.items.items()}
+    joints = [m for m in motions if m["part"]]
+    bodies = [m for m in motions if not m["part"]]
+    parts = [(r["instance"], r["item"], r["part"]) for r in table["joints"]]
+    items = [(r["instance"], r["item"]) for r in table["bodies"]]
+    same = parts == [(instances[m["item"]], m["item"], m["part"]) for m in joints]
+    same &= items == [(instances[m["item"]], m["item"]) for m in bodies]
+    if not expect(same, "names other items than house.json"):
+        return
+    for row, motion in zip(table["joints"], joints, strict=True):
+        value = joint_value(motion, time_s)
+        judge("moved joint", case.place, case.tally, row=row, value=value)
+    for row, motion in zip(table["bodies"], bodies, strict=True):
+        pose = body_pose(motion, float(time_s))
+        judge("moved body", case.place, case.tally, row=row, pose=pose)
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -58,7 +116,7 @@ def check_motion(case: ViewCase) -> None:
     cast = cast.some((cast.face >= 0) & (np.abs(depth - cast.z * 1000) <= 1.0 + cast.z))
     for relation, names in _LAYERS.items():
         layers = {n: case.arrays[n] for n in names if n in case.arrays}
-        partner = OtherView.of(view, relation)
+        partner = partner_of(view, relation)
         if partner is None:
             case.expect("motion")(not layers, f"{[*layers]} without a {relation} view")
             continue
@@ -69,8 +127,8 @@ def check_motion(case: ViewCase) -> None:
         if len(wrong) and then.carry is not None:
             # Of two surfaces at one depth either may move, if it explains all layers together.
             some = cast.some(wrong)
-            faces = of_another_part(some.face, some.origin, some.directions, case.scene)
-            wrong, some = wrong[faces >= 0], replace(some, face=faces).some(faces >= 0)
+            faces = of_another_part(some)
+            wrong, some = wrong[faces >= 0], some.at(faces).some(faces >= 0)
             again, _ = _judge_layers(view, partner, some, layers, then)
             either = wrong[np.logical_and.reduce(list(again.values()))]
             for name in layers:
@@ -83,7 +141,7 @@ def check_motion(case: ViewCase) -> None:
 
 
 def _judge_layers(
-    view: StoredView, other: OtherView, cast: Cast, layers: Layers, then: _Then
+    view: StoredView, other: StoredCamera, cast: Cast, layers: Layers, then: _Then
 ) -> tuple[dict[str, Bools], dict[str, Bools]]:
     """Layer -> (N,) its values at pixels are right; and (N,) right as another answer is right, too."""
 
@@ -188,4 +246,6 @@ def _name_of_partner(
 CHECKS = (
     Check("motion", "view", check_motion, 95, sum(_LAYERS.values(), ())),
     Check("partners", "views", check_partners, 2),
+    Check("motions", "house", check_motions, 6, ("house.json",)),
+    Check("motions", "view", check_motion_table, 17),
 )

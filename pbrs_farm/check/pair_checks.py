@@ -5,18 +5,18 @@ from __future__ import annotations
 import io
 import zlib
 from collections import Counter
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
 
-from pbrs_farm.check.axes import into_frame, opencv_pose
+from pbrs_farm.check.axes import opencv_pose
 from pbrs_farm.check.cases import HouseCase
 from pbrs_farm.check.checks import Check
 from pbrs_farm.check.embree_caster import Rays, is_visible
-from pbrs_farm.check.lens_rays import StoredLens
+from pbrs_farm.check.lens_rays import PlacedCamera, StoredLens
 from pbrs_farm.check.rules import judge
 from pbrs_farm.check.stored_files import BadFile, stored_bytes, stored_object
-from pbrs_farm.core.arrays import F64, Bools
 
 _FILE = "pairs.parquet"
 _GRID = (32, 24)  # rays of a view, across and down
@@ -45,7 +45,7 @@ def check_pairs(case: HouseCase) -> None:
     rng = np.random.default_rng(zlib.crc32(case.house.id.encode()))
     chosen = rng.permutation(len(rows))[:_MOST_PAIRS]
     for row in (rows[int(k)] for k in sorted(chosen)):
-        a, b = (_Camera(views[row[key]]) for key in ("view_a", "view_b"))
+        a, b = (_camera(views[row[key]]) for key in ("view_a", "view_b"))
         shares = {"a_in_b": _share(a, b, case.rest.rays), "b_in_a": _share(b, a, case.rest.rays)}
         judge("pair shares", _place(case, row), case.tally, row=row, shares=shares)
     for row in rows:
@@ -63,8 +63,8 @@ def _place(case: HouseCase, row: dict[str, Any]) -> str:
 
 def _check_row(case: HouseCase, row: dict[str, Any], views: list[dict[str, Any]]) -> None:
     """Rooms of a pair, and the columns that follow from its shares and cameras."""
-    a, b = (_Camera(view) for view in views)
-    cosine = float(np.clip(a.rotation[:, 2] @ b.rotation[:, 2], -1, 1))
+    a, b = (_camera(view) for view in views)
+    cosine = float(np.clip(a.world_from_camera[:3, 2] @ b.world_from_camera[:3, 2], -1, 1))
     facts = {
         "common": (row["a_in_b"] + row["b_in_a"]) / 2,
         "baseline_m": float(np.linalg.norm(a.eye - b.eye)),
@@ -73,48 +73,28 @@ def _check_row(case: HouseCase, row: dict[str, Any], views: list[dict[str, Any]]
     judge("pair", _place(case, row), case.tally, row=row, views=views, facts=facts)
 
 
-class _Camera:
+def _camera(row: Mapping[str, Any]) -> PlacedCamera:
     """A camera of cameras.json with the grid's pixels."""
-
-    def __init__(self, row: dict[str, Any]) -> None:
-        i = row["intrinsics"]
-        x, y = _GRID[0] / i["width_px"], _GRID[1] / i["height_px"]
-        self.f = np.array([i["fx"] * x, i["fy"] * y])
-        self.c = np.array([i["cx"] * x, i["cy"] * y])
-        self.lens = StoredLens.of(i["lens"]) if "lens" in i else None
-        self.pose = opencv_pose(row["world_from_camera_opengl"])
-        self.rotation, self.eye = self.pose[:3, :3], self.pose[:3, 3]
-
-    def directions(self) -> F64:
-        """(N, 3) of unit depth, through the centres of the grid's pixels that see anything."""
-        columns, rows = np.meshgrid(np.arange(_GRID[0]) + 0.5, np.arange(_GRID[1]) + 0.5)
-        plane = (np.stack([columns.ravel(), rows.ravel()], axis=1) - self.c) / self.f
-        if self.lens is None:
-            return np.asarray(np.insert(plane, 2, 1.0, axis=1) @ self.rotation.T)
-        local = self.lens.rays(plane)
-        return np.asarray(local[np.abs(local).sum(1) > 0] @ self.rotation.T)
-
-    def shows(self, points: F64) -> Bools:
-        """(N,) points (N, 3) inside the picture."""
-        local = into_frame(self.pose, points)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            plane, depth = local[:, :2] / local[:, 2:], local[:, 2]
-            if self.lens is not None:
-                plane, depth = self.lens.plane_and_depth(local)
-            px = plane * self.f + self.c
-            inside = ((px >= 0) & (px < _GRID)).all(axis=1)
-            return np.asarray(inside & (depth > 1e-3), bool)
+    i = row["intrinsics"]
+    k = np.array([[i["fx"], 0, i["cx"]], [0, i["fy"], i["cy"]], [0, 0, 1]], np.float64)
+    k[:2] *= np.array([[_GRID[0] / i["width_px"]], [_GRID[1] / i["height_px"]]])
+    lens = StoredLens.of(i["lens"]) if "lens" in i else None
+    return PlacedCamera(k, opencv_pose(row["world_from_camera_opengl"]), _GRID[::-1], lens)
 
 
-def _share(camera: _Camera, other: _Camera, rays: Rays) -> float:
+def _share(camera: PlacedCamera, other: PlacedCamera, rays: Rays) -> float:
     """Share of the ends of one camera's rays that the other sees; 0 if they meet nothing."""
-    directions = camera.directions()
+    directions = camera.ray_grid().reshape(-1, 3)
+    directions = directions[directions.any(axis=1)]
     face = rays.first(camera.eye, directions)
     z = rays.distance(face, camera.eye, directions)
     points = (camera.eye + directions * z[:, None])[face >= 0]
     if not len(points):
         return 0.0
-    visible = is_visible(rays, other.eye, points[other.shows(points)], _REACH_M)
+    px, depth = other.pixels(points)
+    with np.errstate(invalid="ignore"):
+        shown = ((px >= 0) & (px < _GRID)).all(axis=1) & (depth > 1e-3)
+    visible = is_visible(rays, other.eye, points[shown], _REACH_M)
     return float(visible.sum() / len(points))
 
 

@@ -18,10 +18,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.check.axes import dot, published_directions, stored_normals
-from pbrs_farm.check.cases import Pixels, Scene, ViewCase
+from pbrs_farm.check.cases import Cast, Pixels, Scene, ViewCase
 from pbrs_farm.check.checks import Check
 from pbrs_farm.check.colours import srgb_from_linear
-from pbrs_farm.check.mirror_rays import MirrorRays
+from pbrs_farm.check.embree_caster import MirrorRays
 from pbrs_farm.check.stored_mesh import Triangles
 from pbrs_farm.check.stored_view import StoredView
 from pbrs_farm.core.arrays import F64, I64, Bools
@@ -61,7 +61,7 @@ class PixelVerdict:
     tied: Bools  # (N,) right by another triangle than the one that the centre's ray hit
     face: I64  # (N,) that triangle, -1 = nothing
     coincident: Bools  # (N,) tied, and the two triangles fill one place
-    first: I64  # (N,) the triangle that the centre's ray hit, -1 = nothing
+    first: Cast  # the triangles that the centres' rays hit
 
 
 def check_rays(case: ViewCase) -> None:
@@ -74,7 +74,7 @@ def check_rays(case: ViewCase) -> None:
     ]  # fmt: skip
     mirrored = {name: f"behind_mirror_{name}" for name in basic}
     if any(file in case.arrays for file in mirrored.values()):
-        rays = MirrorRays(triangles, case.now.rays, case.view.world_from_camera[:3, 3])
+        rays = MirrorRays(triangles, case.now.rays, case.view.eye)
         scenes.append((Scene(triangles, rays), "ray: behind mirror ", mirrored))
     rows, columns = case.pixels
     for scene, prefix, files in scenes:
@@ -84,7 +84,8 @@ def check_rays(case: ViewCase) -> None:
         labels = {k: a.astype(np.int64) if a.dtype.kind == "u" else a for k, a in labels.items()}
         verdict = judge_pixels(case.view, labels, case.pixels, scene)
         # Coincident surfaces are listed by pairs of items.
-        _note_pairs(case, verdict.first[verdict.coincident], verdict.face[verdict.coincident])
+        of = verdict.coincident
+        _note_pairs(case, verdict.first.face[of], verdict.face[of])
         if prefix == "ray: ":
             _note_glitter(case, verdict)
         ties = int((verdict.tied & ~verdict.coincident).sum())
@@ -105,10 +106,9 @@ def _note_pairs(case: ViewCase, first: I64, second: I64) -> None:
 def _note_glitter(case: ViewCase, verdict: PixelVerdict) -> None:
     """Report the pixels that show either of two colours, if a pair of items has more than a few."""
     instance = case.now.triangles.instance
-    origin, directions = case.view.rays(*case.pixels)
-    faces = of_another_colour(verdict.first, origin, directions, case.scene)
+    faces = of_another_colour(verdict.first)
     shown = np.nonzero((faces >= 0) & ~verdict.coincident)[0]
-    first, second = verdict.first[shown], faces[shown]
+    first, second = verdict.first.face[shown], faces[shown]
     pairs = np.sort(np.stack([instance[first], instance[second]], 1), axis=1)
     _, number, n = np.unique(pairs, axis=0, return_inverse=True, return_counts=True)
     many = n[number.reshape(-1)] > _MOST_COINCIDENT
@@ -117,27 +117,25 @@ def _note_glitter(case: ViewCase, verdict: PixelVerdict) -> None:
 
 def judge_pixels(view: StoredView, labels: Labels, pixels: Pixels, scene: Scene) -> PixelVerdict:
     """Compare stored values of RAY_LAYERS at N pixels with rays through the scene."""
-    rays, (rows, columns) = scene.rays, pixels
-    origin, directions = view.rays(rows, columns)
-    first = rays.first(origin, directions)
-    face = first.copy()
-    right = _explain(view, labels, face, directions, scene)
-    tied = np.zeros(len(rows), bool)
+    first = Cast.of(view, *pixels, scene)
+    face = first.face.copy()
+    right = _explain(view, labels, first)
+    tied = np.zeros(len(face), bool)
 
     # Try other triangles where the first triangle does not explain every label.
     open_ = np.nonzero(~np.logical_and.reduce(list(right.values())))[0]
     open_labels = {name: array[open_] for name, array in labels.items()}
-    beside = [view.rays(rows[open_] + dy, columns[open_] + dx)[1] for dx, dy in _JITTER]
-    candidates = [rays.first(origin, ray) for ray in beside]
-    candidates.append(_coincident(open_labels, face[open_], origin, directions[open_], scene))
+    centre = first.some(open_)
+    beside = [Cast.of(view, centre.rows + dy, centre.columns + dx, scene) for dx, dy in _JITTER]
+    candidates = [cast.face for cast in beside]
+    candidates.append(_coincident(open_labels, centre))
     if len(open_) <= _MOST_GRAZED:
         # At the outline of an item its far side meets the near one: the ray may graze either.
-        grazed = zip(candidates[: len(beside)], beside, strict=True)
-        candidates += [_coincident(open_labels, c, origin, ray, scene) for c, ray in grazed]
+        candidates += [_coincident(open_labels, cast) for cast in beside]
     # Take a candidate that leaves fewer labels wrong.
     best = np.sum([~right[name][open_] for name in right], axis=0)
     for candidate in candidates:
-        trial = _explain(view, open_labels, candidate, directions[open_], scene)
+        trial = _explain(view, open_labels, centre.at(candidate))
         wrong = np.sum([~ok for ok in trial.values()], axis=0)
         better = wrong < best
         best = np.where(better, wrong, best)
@@ -145,20 +143,18 @@ def judge_pixels(view: StoredView, labels: Labels, pixels: Pixels, scene: Scene)
         for name in right:
             right[name][open_[better]] = trial[name][better]
     tied[open_] = best == 0
-    coincident = tied & _fill_one_place(first, face, tied, origin, directions, scene)
+    coincident = tied & _fill_one_place(first.face, first.at(face), tied)
     return PixelVerdict(right, tied, face, coincident, first)
 
 
-def _fill_one_place(
-    first: I64, second: I64, chosen: Bools, origin: F64, directions: F64, scene: Scene
-) -> Bools:
+def _fill_one_place(first: I64, second: Cast, chosen: Bools) -> Bools:
     """(N,) of the chosen pixels, those whose ray pierces two parallel triangles in one place."""
-    triangles, rays = scene
+    triangles, rays = second.scene
     fill = np.zeros(len(first), bool)
-    pixels = np.nonzero(chosen & (first >= 0) & (second >= 0) & (first != second))[0]
-    starts, legs, _way = rays.last_leg(origin, directions[pixels])
+    pixels = np.nonzero(chosen & (first >= 0) & second.hit & (first != second.face))[0]
+    starts, legs, _way = rays.last_leg(second.origin, second.directions[pixels])
     for k, start, leg in zip(pixels, starts, legs, strict=True):
-        pair, ray = np.array([first[k], second[k]]), directions[k]
+        pair, ray = np.array([first[k], second.face[k]]), second.directions[k]
         normals = rays.normal(pair, np.stack([ray, ray]))
         t = distances_pierced(triangles, pair, start, leg)
         if np.isfinite(t).all() and abs(normals[0] @ normals[1]) >= _PARALLEL:
@@ -166,116 +162,85 @@ def _fill_one_place(
     return fill
 
 
-def _explain(
-    view: StoredView, labels: Labels, face: I64, directions: F64, scene: Scene
-) -> dict[str, Bools]:
-    """Layer -> (N,) True where hitting these faces explains the stored value."""
-    triangles, rays = scene
-    classes = np.zeros(max(triangles.nyu40, default=0) + 1, np.int64)
-    classes[list(triangles.nyu40)] = list(triangles.nyu40.values())
-    z = rays.distance(face, view.world_from_camera[:3, 3], directions)
-    hits = _Hits(view, triangles, classes, face, z, rays.normal(face, directions), directions)
-    return {name: np.asarray(_LABELS[name](stored, hits), bool) for name, stored in labels.items()}
+def _explain(view: StoredView, labels: Labels, cast: Cast) -> dict[str, Bools]:
+    """Layer -> (N,) True where hitting the faces of a cast explains the stored value."""
+    return {n: np.asarray(_LABELS[n](stored, cast, view), bool) for n, stored in labels.items()}
 
 
-@dataclass(frozen=True, slots=True, eq=False)
-class _Hits:
-    """N pixels and the faces that their rays are assumed to hit."""
-
-    view: StoredView
-    triangles: Triangles
-    classes: I64  # instance -> NYU40
-    face: I64  # (N,), -1 = nothing
-    z: F64  # (N,) metres along the ray, in units of directions
-    normal: F64  # (N, 3) of the face, world
-    directions: F64  # (N, 3)
-
-    @property
-    def hit(self) -> Bools:
-        return self.face >= 0
-
-    @property
-    def instance(self) -> I64:
-        return self.of_face(self.triangles.instance)
-
-    @property
-    def point(self) -> F64:
-        return np.asarray(self.view.world_from_camera[:3, 3] + self.directions * self.z[:, None])
-
-    @property
-    def depth_error_mm(self) -> F64:
-        """(N,) tolerance of a depth in whole mm: rounding, and the ray's error on a slant."""
-        cosine = np.abs(dot(self.normal, self.directions))
-        slant_mm = _RAY_ERROR_MM * self.z / np.maximum(cosine, 1e-9)
-        return np.asarray(_ROUNDING_MM + np.minimum(slant_mm, _MAX_RAY_ERROR_MM))
-
-    def of_face(self, table: NDArray[Any]) -> NDArray[Any]:
-        """(N,) table[face], 0 where face is -1."""
-        if not len(table):
-            return np.zeros(len(self.face), table.dtype)
-        return np.where(self.hit, table[self.face], table.dtype.type(0))
-
-    def mask(self, chosen: Bools) -> NDArray[Any]:
-        """(N,) 255 where something is hit and chosen, else 0."""
-        return np.where(self.hit & chosen, 255, 0)
-
-    def where_hit(self, function: Callable[[I64, F64, Any], Any], *width: int) -> F64:
-        """(N, *width) function(face, point, index) where something is hit, else 0."""
-        values = np.zeros((len(self.face), *width))
-        hit = np.nonzero(self.hit)[0]
-        values[hit] = function(self.face[hit], self.point[hit], hit)
-        return values
+def _error_mm(cast: Cast) -> F64:
+    """(N,) tolerance of a depth in whole mm: rounding, and the ray's error on a slant."""
+    cosine = np.abs(dot(cast.normal, cast.directions))
+    slant_mm = _RAY_ERROR_MM * cast.z / np.maximum(cosine, 1e-9)
+    return np.asarray(_ROUNDING_MM + np.minimum(slant_mm, _MAX_RAY_ERROR_MM))
 
 
-def _depth_is_right(stored: NDArray[Any], hits: _Hits) -> Bools:
-    mm = np.clip(hits.z * 1000, 0.5, 65535)
-    return np.where(hits.hit, np.abs(stored - mm) <= hits.depth_error_mm, stored == 0)
+def _mask(cast: Cast, chosen: Bools) -> NDArray[Any]:
+    """(N,) 255 where something is hit and chosen, else 0."""
+    return np.where(cast.hit & chosen, 255, 0)
 
 
-def _position_is_right(stored: NDArray[Any], hits: _Hits) -> Bools:
-    near = np.abs(stored - hits.point).max(axis=1) <= _METRES
-    return np.where(hits.hit, near, ~stored.any(axis=1))
+def _where_hit(cast: Cast, function: Callable[[Cast], Any], *width: int) -> F64:
+    """(N, *width) values of a function of the rays that hit anything, else 0."""
+    values = np.zeros((len(cast), *width))
+    values[cast.hit] = function(cast.some(cast.hit))
+    return values
 
 
-def _shading_is_right(stored: NDArray[Any], hits: _Hits) -> Bools:
-    normals = hits.where_hit(
-        lambda face, point, k: hits.triangles.shading_normals(face, point, hits.normal[k]), 3
-    )
-    published = published_directions(normals, hits.view.world_from_camera)
+def _depth_is_right(stored: NDArray[Any], cast: Cast, _view: StoredView) -> Bools:
+    mm = np.clip(cast.z * 1000, 0.5, 65535)
+    return np.where(cast.hit, np.abs(stored - mm) <= _error_mm(cast), stored == 0)
+
+
+def _position_is_right(stored: NDArray[Any], cast: Cast, _view: StoredView) -> Bools:
+    near = np.abs(stored - cast.point).max(axis=1) <= _METRES
+    return np.where(cast.hit, near, ~stored.any(axis=1))
+
+
+def _shading_is_right(stored: NDArray[Any], cast: Cast, view: StoredView) -> Bools:
+    of = cast.scene.triangles.shading_normals
+    normals = _where_hit(cast, lambda hit: of(hit.face, hit.point, hit.normal), 3)
+    published = published_directions(normals, view.world_from_camera)
     return normal_is_right(stored, published, _SHADING_DEG)
 
 
-def _albedo_is_right(stored: NDArray[Any], hits: _Hits) -> Bools:
-    expected = albedo_of_faces(hits.view, hits.face, hits.point, hits.triangles)
-    return np.asarray(np.abs(stored - expected).max(axis=1) <= _ALBEDO_STEPS)
+def _albedo_is_right(stored: NDArray[Any], cast: Cast, view: StoredView) -> Bools:
+    return np.asarray(np.abs(stored - albedo_of(view, cast)).max(axis=1) <= _ALBEDO_STEPS)
 
 
-def albedo_of_faces(view: StoredView, face: I64, point: F64, triangles: Triangles) -> F64:
-    """(N, 3) sRGB 0..255 of the materials at points (N, 3) on faces; 0 where face is -1."""
-    colours = np.zeros((len(face), 3))
-    hit = np.nonzero(face >= 0)[0]
+def albedo_of(view: StoredView, cast: Cast) -> F64:
+    """(N, 3) sRGB 0..255 of the materials at the hits; 0 for nothing."""
     is_physical = view.recipe is not None and view.recipe.materials.preset == "physical"
     most = _PHYSICAL_ALBEDO if is_physical else 1.0
-    colours[hit] = triangles.colour_at(face[hit], point[hit], most)
-    return colours
+
+    def colour(hit: Cast) -> F64:
+        point = np.where(np.isfinite(hit.point), hit.point, 0.0)
+        return cast.scene.triangles.colour_at(hit.face, point, most)
+
+    return _where_hit(cast, colour, 3)
 
 
-def _roughness_is_right(stored: NDArray[Any], hits: _Hits) -> Bools:
-    alpha = hits.where_hit(lambda face, point, _k: hits.triangles.alpha_at(face, point))
+def _roughness_is_right(stored: NDArray[Any], cast: Cast, _view: StoredView) -> Bools:
+    of = cast.scene.triangles.alpha_at
+    alpha = _where_hit(cast, lambda hit: of(hit.face, hit.point))
     return np.asarray(np.abs(stored - 255 * np.sqrt(alpha)) <= _ROUGHNESS_STEPS)
 
 
-def _f0_is_right(stored: NDArray[Any], hits: _Hits) -> Bools:
-    triangles = hits.triangles
-    linear = hits.where_hit(lambda face, *_: triangles.finishes.f0()[triangles.material[face]], 3)
+def _f0_is_right(stored: NDArray[Any], cast: Cast, _view: StoredView) -> Bools:
+    triangles = cast.scene.triangles
+    linear = _where_hit(cast, lambda hit: triangles.finishes.f0()[triangles.material[hit.face]], 3)
     return np.asarray(np.abs(stored - 255 * srgb_from_linear(linear)).max(axis=1) <= 0.51)
 
 
-def _nocs_is_right(stored: NDArray[Any], hits: _Hits) -> Bools:
+def _is_metal(cast: Cast) -> Bools:
+    triangles = cast.scene.triangles
+    return np.asarray(cast.of_face(triangles.of_material(triangles.finishes.is_metal())), bool)
+
+
+def _nocs_is_right(stored: NDArray[Any], cast: Cast, view: StoredView) -> Bools:
     """(N,) stored model coordinates are those of the points; 0 off placed models."""
-    triangles, instance, point = hits.triangles, hits.instance, hits.point
+    triangles, instance, point = cast.scene.triangles, cast.instance, cast.point
     right = np.asarray(~stored.any(axis=1), bool)
-    for row in hits.view.table["instances"]:
+    for row in view.table["instances"]:
         chosen = instance == int(row["id"])
         if "world_from_model" not in row or not chosen.any():
             continue
@@ -296,14 +261,14 @@ def _in_model(pose: F64, points: F64) -> F64:
     return np.asarray(local.T, np.float64)
 
 
-def _part_is_right(stored: NDArray[Any], hits: _Hits) -> Bools:
+def _part_is_right(stored: NDArray[Any], cast: Cast, view: StoredView) -> Bools:
     """(N,) the part's row in articulation.json names the part of the face; 0 for static faces."""
-    rows = {int(row["id"]): (int(row["instance"]), str(row["part"])) for row in hits.view.parts}
-    names, parts = hits.triangles.parts, hits.of_face(hits.triangles.part)
+    rows = {int(row["id"]): (int(row["instance"]), str(row["part"])) for row in view.parts}
+    names, parts = cast.scene.triangles.parts, cast.of_face(cast.scene.triangles.part)
     return np.array(
         [
             rows.get(int(number)) == (int(instance), names[part]) if number else part == 0
-            for number, instance, part in zip(stored, hits.instance, parts, strict=True)
+            for number, instance, part in zip(stored, cast.instance, parts, strict=True)
         ],
         bool,
     )
@@ -323,25 +288,25 @@ def normal_is_right(
     return np.asarray(np.where(expected.any(axis=1), close, nothing), bool)
 
 
-def _coincident(labels: Labels, face: I64, origin: F64, directions: F64, scene: Scene) -> I64:
+def _coincident(labels: Labels, cast: Cast) -> I64:
     """(N,) another triangle of the stored instance pierced at the first hit's depth (a doubled face), or -1."""
     if "instance" not in labels:
-        return np.full(len(face), -1, np.int64)
+        return np.full(len(cast), -1, np.int64)
 
     @functools.cache
     def of_instance(instance: int) -> I64:
-        return np.nonzero(scene.triangles.instance == instance)[0]
+        return np.nonzero(cast.scene.triangles.instance == instance)[0]
 
     def candidates(k: int) -> I64:
         faces = of_instance(int(labels["instance"][k]))
-        return np.asarray(faces[faces != face[k]])
+        return np.asarray(faces[faces != cast.face[k]])
 
-    return _pierced_beside(face, origin, directions, scene, candidates)
+    return _pierced_beside(cast, candidates)
 
 
-def of_another_colour(face: I64, origin: F64, directions: F64, scene: Scene) -> I64:
+def of_another_colour(cast: Cast) -> I64:
     """(N,) a coincident triangle of another material (the picture shows either), or -1."""
-    triangles = scene.triangles
+    triangles, face = cast.scene.triangles, cast.face
     planes = _number_planes(triangles.vertices.astype(np.float64)[triangles.faces])
     order = np.argsort(planes, kind="stable")
     last = np.searchsorted(planes[order], planes, side="right")
@@ -351,43 +316,39 @@ def of_another_colour(face: I64, origin: F64, directions: F64, scene: Scene) -> 
         faces = order[start[face[k]] : last[face[k]]] if face[k] >= 0 else order[:0]
         return np.asarray(faces[triangles.material[faces] != triangles.material[face[k]]])
 
-    return _pierced_beside(face, origin, directions, scene, candidates)
+    return _pierced_beside(cast, candidates)
 
 
-def of_another_part(face: I64, origin: F64, directions: F64, scene: Scene) -> I64:
+def of_another_part(cast: Cast) -> I64:
     """(N,) a coincident triangle of another item or part, as where a leaf crosses its frame, or -1."""
-    triangles, rays = scene
+    triangles, face, point = cast.scene.triangles, cast.face, cast.point
     corners = triangles.vertices.astype(np.float64)[triangles.faces]
     low, high = corners.min(1) - _TIE_M, corners.max(1) + _TIE_M
-    distance = rays.distance(face, origin, directions)
 
     def candidates(k: int) -> I64:
-        point = origin + distance[k] * directions[k]
         is_other = triangles.instance != triangles.instance[face[k]]
         is_other |= triangles.part != triangles.part[face[k]]
         is_other &= bool(face[k] >= 0)
-        return np.nonzero(is_other & ((low <= point) & (point <= high)).all(1))[0]
+        return np.nonzero(is_other & ((low <= point[k]) & (point[k] <= high)).all(1))[0]
 
-    return _pierced_beside(face, origin, directions, scene, candidates)
+    return _pierced_beside(cast, candidates)
 
 
-def _pierced_beside(
-    face: I64, origin: F64, directions: F64, scene: Scene, candidates: Callable[[int], I64]
-) -> I64:
-    """(N,) of each ray's candidate triangles, the one that it pierces at the depth of face, or -1."""
-    triangles, rays = scene
-    nearest = np.full(len(face), -1, np.int64)
-    starts, legs, way = rays.last_leg(origin, directions)
-    depth = rays.distance(face, origin, directions) - way
+def _pierced_beside(cast: Cast, candidates: Callable[[int], I64]) -> I64:
+    """(N,) of each ray's candidate triangles, the one that it pierces at the depth of its hit, or -1."""
+    triangles, rays = cast.scene
+    nearest = np.full(len(cast), -1, np.int64)
+    starts, legs, way = rays.last_leg(cast.origin, cast.directions)
+    depth = cast.z - way
     # Measure gaps across the surface: along a slanting ray they are longer.
-    across = np.abs(dot(rays.normal(face, directions), directions))
-    for k in range(len(face)):
+    across = np.abs(dot(cast.normal, cast.directions))
+    for k in range(len(cast)):
         faces = candidates(k)
         if len(faces):
             gap = np.abs(distances_pierced(triangles, faces, starts[k], legs[k]) - depth[k])
             if gap.min() * across[k] <= _TIE_M:
                 nearest[k] = faces[gap.argmin()]
-    return rays.without_holes(nearest, origin, directions)
+    return rays.without_holes(nearest, cast.origin, cast.directions)
 
 
 def _number_planes(corners: F64) -> I64:
@@ -420,29 +381,30 @@ def distances_pierced(triangles: Triangles, faces: I64, origin: F64, ray: F64) -
 
 
 # Layer -> which of its stored values are right.
-_LABELS: Final[Mapping[str, Callable[[NDArray[Any], _Hits], Any]]] = {
-    "instance": lambda stored, hits: stored == hits.instance,
-    "semantic": lambda stored, hits: stored == hits.classes[hits.instance],
+_LABELS: Final[Mapping[str, Callable[[NDArray[Any], Cast, StoredView], Any]]] = {
+    "instance": lambda stored, cast, _view: stored == cast.instance,
+    "semantic": lambda stored, cast, _view: stored == cast.scene.triangles.classes[cast.instance],
     "depth": _depth_is_right,
-    "normal": lambda stored, hits: normal_is_right(
-        stored, published_directions(hits.normal, hits.view.world_from_camera)
+    "normal": lambda stored, cast, view: normal_is_right(
+        stored, published_directions(cast.normal, view.world_from_camera)
     ),
-    "valid": lambda stored, hits: stored == np.where(hits.hit, 255, 0),
-    "depth_z": lambda stored, hits: np.where(
-        hits.hit, np.abs(stored - hits.z) <= _METRES, stored == 0
+    "valid": lambda stored, cast, _view: stored == np.where(cast.hit, 255, 0),
+    "depth_z": lambda stored, cast, _view: np.where(
+        cast.hit, np.abs(stored - cast.z) <= _METRES, stored == 0
     ),
     "position": _position_is_right,
-    "normal_world": lambda stored, hits: normal_is_right(stored, hits.normal),
-    "material": lambda stored, hits: stored == hits.of_face(hits.triangles.material + 1),
-    "glass": lambda stored, hits: stored == hits.mask(hits.of_face(hits.triangles.see_through)),
-    "mirror": lambda stored, hits: (
-        stored == hits.mask(hits.triangles.kinds_of(hits.face) == "mirror")
+    "normal_world": lambda stored, cast, _view: normal_is_right(stored, cast.normal),
+    "material": lambda stored, cast, _view: (
+        stored == cast.of_face(cast.scene.triangles.material + 1)
+    ),
+    "glass": lambda stored, cast, _view: (
+        stored == _mask(cast, cast.of_face(cast.scene.triangles.see_through))
+    ),
+    "mirror": lambda stored, cast, _view: (
+        stored == _mask(cast, cast.scene.triangles.kinds_of(cast.face) == "mirror")
     ),
     "roughness": _roughness_is_right,
-    "metallic": lambda stored, hits: (
-        stored
-        == hits.mask(hits.of_face(hits.triangles.of_material(hits.triangles.finishes.is_metal())))
-    ),
+    "metallic": lambda stored, cast, _view: stored == _mask(cast, _is_metal(cast)),
     "f0": _f0_is_right,
     "normal_shading": _shading_is_right,
     "nocs": _nocs_is_right,

@@ -17,6 +17,12 @@ def is_within(polygon: list[list[float]], point: F64) -> bool:
     return bool((crosses & (point[0] < x)).sum() % 2)
 
 
+def polygon_area(points: F64) -> float:
+    """Area of a simple polygon (N, 2), as the sum of its trapezia."""
+    x, z = points.T
+    return abs(float((x * np.roll(z, -1) - np.roll(x, -1) * z).sum())) / 2
+
+
 def points_in_plan(
     polygon: list[list[float]], n: int, height: float, *, inner: bool = False
 ) -> F64:

@@ -70,7 +70,7 @@ def _points_of(seen: SeenView) -> F64:
     grid = np.mgrid[_STEP_PX // 2 : height : _STEP_PX, _STEP_PX // 2 : width : _STEP_PX]
     rows, columns = (g.reshape(-1) for g in grid)
     normal = world_normals(seen.normal[rows, columns], view.world_from_camera)
-    centre, eye = _positions(seen, rows, columns), view.world_from_camera[:3, 3]
+    centre, eye = _positions(seen, rows, columns), view.eye
     # Keep the pixels whose 5 x 5 neighbours are on the plane of the normal.
     z = seen.depth[rows, columns] / 1000
     flat = (z > 0) & (z < 65) & ~seen.moves[rows, columns]
@@ -95,7 +95,7 @@ def _nearest(depth: NDArray[Any]) -> F64:
 def _count_in_front(points: F64, view: StoredView, nearest: F64) -> tuple[int, int]:
     """Numbers of points inside the view's picture, and in front of every surface that it sees there."""
     # Leave out surfaces seen from the side, or from much farther than by their own view.
-    towards = points[:, 0] - view.world_from_camera[:3, 3]
+    towards = points[:, 0] - view.eye
     distance = np.linalg.norm(towards, axis=1)
     first_distance = np.linalg.norm(points[:, 0] - points[:, 2], axis=1)
     broad = np.abs(dot(points[:, 1], towards)) > _MIN_COSINE * distance

@@ -18,11 +18,11 @@ from pbrs_farm.check.axes import dot, world_normals
 from pbrs_farm.check.cases import SAMPLE, ViewCase
 from pbrs_farm.check.checks import Check
 from pbrs_farm.check.colours import has_channels, linear_from_srgb, luminance_of
+from pbrs_farm.check.developing import tile_means
 from pbrs_farm.check.finishes import has_roughness
 from pbrs_farm.check.picture_checks import moved_copies
-from pbrs_farm.check.pixel_checks import albedo_of_faces
+from pbrs_farm.check.pixel_checks import albedo_of
 from pbrs_farm.check.stored_house import StoredHouse
-from pbrs_farm.check.tiles import tile_means
 from pbrs_farm.core.arrays import F64, Bools
 
 COAT = 0.04  # reflectance of a coat at normal incidence: glass of index 1.5
@@ -75,7 +75,7 @@ def check_guides(case: ViewCase) -> None:
     if not has_channels(channels, view.size, "albedo", "normal"):
         return
     _check_alignment(case)
-    triangles, rays = case.scene
+    triangles = case.now.triangles
     cast = case.cast(*case.sample(SAMPLE))
     flat = is_amid(case.arrays["instance"], case.arrays["normal"])[cast.rows, cast.columns]
     is_guided = ~np.isin(triangles.kinds_of(cast.face), ("glass", "pane", "mirror", "bulb"))
@@ -84,16 +84,12 @@ def check_guides(case: ViewCase) -> None:
     cast = cast.some((cast.face >= 0) & flat & is_guided)
     if len(cast) < _FEW_GUIDES:
         return
-    face, origin = cast.face, cast.origin
-    middle = albedo_of_faces(view, face, cast.point, triangles) / 255
+    face, middle = cast.face, albedo_of(view, cast) / 255
     linear = [linear_from_srgb(middle)]
     for dy, dx in itertools.product(_BESIDE, repeat=2):
-        _, ray = view.rays(cast.rows + dy, cast.columns + dx)
-        beside = rays.first(origin, ray)
-        beside = np.where(beside >= 0, beside, face)
-        point = origin + ray * rays.distance(beside, origin, ray)[:, None]
-        point = np.where(np.isfinite(point), point, 0.0)
-        linear.append(linear_from_srgb(albedo_of_faces(view, beside, point, triangles) / 255))
+        beside = case.cast(cast.rows + dy, cast.columns + dx)
+        beside = beside.at(np.where(beside.hit, beside.face, face))
+        linear.append(linear_from_srgb(albedo_of(view, beside) / 255))
     albedo = np.mean(linear, axis=0)
     # Light of the published materials takes their plain colours without conversion (docs/spec/suncg.md).
     if _is_released(house):

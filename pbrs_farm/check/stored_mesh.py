@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import json
 import struct
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from typing import Any
 
@@ -14,10 +14,13 @@ from numpy.typing import NDArray
 from pbrs_farm.check.axes import dot
 from pbrs_farm.check.colours import linear_from_srgb, srgb_from_linear
 from pbrs_farm.check.finishes import Finishes, mapped_alpha
-from pbrs_farm.check.shading_normals import bent, between_corners, decoded
-from pbrs_farm.check.textures import Encoded, Pixels, Textures, between_texels
 from pbrs_farm.core.arrays import F32, F64, I64, Bools
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.images import decode_texture
 
+Encoded = tuple[str, bytes] | None  # media type and bytes
+Pixels = NDArray[np.uint8]  # (H, W, C)
+_LEAST_Z = 0.1  # least slope of a map's unit normal: a steeper one is noise of the picture
 _DTYPES = {5121: "<u1", 5123: "<u2", 5125: "<u4", 5126: "<f4"}  # glTF component types
 _WIDTHS = {"SCALAR": 1, "VEC2": 2, "VEC3": 3}  # components of an element
 _SHARE = np.arange(256) / 255  # value 0..1 of a byte
@@ -25,6 +28,91 @@ _LINEAR = linear_from_srgb(_SHARE)  # linear light of a byte
 _SEE_THROUGH = ("glass", "pane")  # kinds of material
 _BENT = ("opaque", "mirror", "shade")  # kinds whose normal map has an effect
 _MAX_ELEMENTS = 50_000_000  # vertices or triangles: nodes may repeat a mesh many times
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Textures:
+    """One kind of picture, such as the normal maps, of each material."""
+
+    encoded: tuple[Encoded, ...] = ()
+    _decoded: dict[int, Pixels | None] = field(default_factory=dict)
+
+    def of(self, material: int) -> Pixels | None:
+        """(H, W, C) pixels of a material's picture; None if it is missing or cannot be decoded."""
+        if material not in self._decoded:
+            self._decoded[material] = self._decode(material)
+        return self._decoded[material]
+
+    def _decode(self, material: int) -> Pixels | None:
+        stored = self.encoded[material] if material < len(self.encoded) else None
+        if stored is None:
+            return None
+        try:
+            pixels = decode_texture(stored[1], f"material {material}", stored[0])
+        except BadInput:
+            return None
+        return pixels[..., None] if pixels.ndim == 2 else pixels
+
+    def apply(self, material: I64, function: Callable[[int, NDArray[Any], Pixels], None]) -> None:
+        """Call function(material, mask of its points, pixels) for each material with a picture among N points."""
+        for number in np.unique(material).tolist():
+            pixels = self.of(number)
+            if pixels is not None:
+                function(number, material == number, pixels)
+
+
+def between_texels(pixels: Pixels, uv: F64, value_of_byte: F64) -> F64:
+    """(N, C) values interpolated between the four texels around each uv (N, 2), which repeats; v down."""
+    height, width = pixels.shape[:2]
+    x, y = uv[:, 0] * width - 0.5, uv[:, 1] * height - 0.5
+    values = np.zeros((len(uv), pixels.shape[2]))
+    for dx, dy in ((0, 0), (1, 0), (0, 1), (1, 1)):
+        column, row = np.floor(x) + dx, np.floor(y) + dy
+        weight = (1 - np.abs(x - column)) * (1 - np.abs(y - row))
+        texel = value_of_byte[pixels[(row % height).astype(int), (column % width).astype(int)]]
+        values += weight[:, None] * texel
+    return values
+
+
+def between_corners(weights: F64, normals: F32, facing: F64) -> F64:
+    """(N, 3) unit normals interpolated from the corners' (N, 3, 3), towards facing; facing without normals."""
+    mean = np.einsum("nk,nkc->nc", weights, normals.astype(np.float64))
+    length = np.linalg.norm(mean, axis=1, keepdims=True)
+    smooth = np.where(length > 1e-6, mean / np.maximum(length, 1e-12), facing)
+    away = dot(smooth, facing) < 0
+    return np.where(away[:, None], -smooth, smooth)
+
+
+def bent(normals: F64, corners: F64, uv: F64, mapped: F64) -> F64:
+    """(N, 3) normals of triangles (N, 3, 3) with uv (N, 3, 2), v down, bent by mapped (N, 3): see `decoded`."""
+    e1, e2 = corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]
+    up = uv * [1.0, -1.0]
+    a, b = up[:, 1] - up[:, 0], up[:, 2] - up[:, 0]
+    area = a[:, 0] * b[:, 1] - a[:, 1] * b[:, 0]
+    has_uv = np.abs(area) > 1e-6 * ((a**2).sum(1) + (b**2).sum(1))
+    side = np.sign(area)[:, None]
+    along = (b[:, 1:] * e1 - a[:, 1:] * e2) * side
+    # The map is on the front: turn normals of the back there and back.
+    front = np.cross(e1, e2)
+    turn = np.where(dot(normals, front) < 0, -1.0, 1.0)[:, None]
+    normal = turn * normals
+    tangent = along - normal * dot(normal, along)[:, None]
+    length = np.linalg.norm(tangent, axis=1, keepdims=True)
+    tangent = tangent / np.maximum(length, 1e-30)
+    across = np.cross(normal, tangent) * side
+    out = mapped[:, :1] * tangent + mapped[:, 1:2] * across + mapped[:, 2:] * normal
+    out = out / np.maximum(np.linalg.norm(out, axis=1, keepdims=True), 1e-12)
+    return np.where(has_uv[:, None] & (length > 1e-20), turn * out, normals)
+
+
+def decoded(values: F64, scale: float) -> F64:
+    """(N, 3) unit normals in tangent space of (N, 3) bytes; black ones are flat."""
+    xyz = values * (2 / 255) - 1
+    black = (xyz <= -1).all(axis=1)
+    xyz[:, :2] *= scale
+    xyz[:, 2] = np.maximum(xyz[:, 2], _LEAST_Z * np.maximum(np.hypot(xyz[:, 0], xyz[:, 1]), 1e-6))
+    xyz[black] = [0, 0, 1]
+    return np.asarray(xyz / np.linalg.norm(xyz, axis=1, keepdims=True))
 
 
 class BadGlb(ValueError):
@@ -89,6 +177,13 @@ class Triangles:
     def with_finishes(self, rows: Sequence[Mapping[str, Any]]) -> Triangles:
         """The same with the materials' rows of house.json, which hold more of gloss than glTF does."""
         return replace(self, finishes=Finishes(tuple(rows)))
+
+    @property
+    def classes(self) -> I64:
+        """(I,) classes of all instances, 0 for numbers without one."""
+        classes = np.zeros(max(self.nyu40, default=0) + 1, np.int64)
+        classes[list(self.nyu40)] = list(self.nyu40.values())
+        return classes
 
     def only(self, instance: int) -> Triangles:
         """The triangles of one item."""

@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.check.certificate import Tally
-from pbrs_farm.check.lens_rays import StoredLens
+from pbrs_farm.check.lens_rays import StoredCamera, StoredLens
 from pbrs_farm.check.stored_files import BadFile, stored_bytes, stored_object
 from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.errors import BadInput, BadRecipe
@@ -25,7 +25,7 @@ BASIC = tuple(x.name for x in LAYERS if x.step == "truth" and not x.optional)
 
 
 @dataclass(frozen=True)
-class StoredView:
+class StoredView(StoredCamera):
     """A views/<view_id> folder."""
 
     folder: Path
@@ -41,7 +41,7 @@ class StoredView:
         """The view's take, frame and camera of a rig."""
         return Shot.of_row(self.folder.name, self.table)
 
-    @property
+    @cached_property
     def size(self) -> tuple[int, int]:
         """(height, width) in pixels."""
         return int(self.table["height_px"]), int(self.table["width_px"])
@@ -64,16 +64,6 @@ class StoredView:
     def lens(self) -> StoredLens | None:
         """The lens, None for a pinhole."""
         return StoredLens.of(self.table["lens"]) if "lens" in self.table else None
-
-    def pixels_and_depths(self, camera: F64) -> tuple[F64, F64]:
-        """(N, 2) pixels and (N,) depths of points (N, 3) with OpenCV's axes; NaN where not visible."""
-        if self.lens is not None:
-            plane, depth = self.lens.plane_and_depth(camera)
-        else:
-            depth = np.where(camera[:, 2] > 0, camera[:, 2], np.nan)
-            plane = camera[:, :2] / depth[:, None]
-        pixel = np.concatenate([plane, np.ones((len(plane), 1))], axis=1) @ self.k.T
-        return pixel[:, :2], depth
 
     @cached_property
     def world_from_camera(self) -> F64:
@@ -113,23 +103,6 @@ class StoredView:
             return stored_bytes(self.folder / file)
         except BadFile as error:
             raise BadInput(f"{self.place}/{file}", "", str(error)) from None
-
-    def ray_grid(self) -> F64:
-        """(H, W, 3) the directions of `rays` through all pixels."""
-        height, width = self.size
-        rows, columns = (g.reshape(-1) for g in np.mgrid[0:height, 0:width])
-        return self.rays(rows, columns)[1].reshape(height, width, 3)
-
-    def rays(self, rows: NDArray[Any], columns: NDArray[Any]) -> tuple[F64, F64]:
-        """Origin (3,) and directions (N, 3) of unit depth through (column + 0.5, row + 0.5), in the world.
-
-        Depth is as the view stores it, along the axis or along the ray; (0, 0, 0) is no ray.
-        """
-        pixel = np.stack([columns + 0.5, rows + 0.5, np.ones(len(rows))], axis=1)
-        camera = np.linalg.solve(self.k, pixel.T).T
-        if self.lens is not None:
-            camera = self.lens.rays(np.asarray(camera[:, :2], np.float64))
-        return self.world_from_camera[:3, 3], camera @ self.world_from_camera[:3, :3].T
 
 
 def views_of_house(house: Path) -> tuple[list[StoredView], dict[Path, str]]:

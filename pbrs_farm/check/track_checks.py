@@ -15,7 +15,8 @@ from pbrs_farm.check.cases import HouseCase, Scenes
 from pbrs_farm.check.certificate import Expect, Tally
 from pbrs_farm.check.checks import Check
 from pbrs_farm.check.embree_caster import Hits
-from pbrs_farm.check.followed_points import OtherView, is_seen
+from pbrs_farm.check.followed_points import is_seen
+from pbrs_farm.check.lens_rays import StoredCamera
 from pbrs_farm.check.stored_files import BadFile, stored_bytes
 from pbrs_farm.check.stored_view import StoredView
 from pbrs_farm.core.arrays import F64, I64, Bools
@@ -139,23 +140,22 @@ def _check_group(film: _Film, frame: int, index: I64) -> None:
 def _check_frame(film: _Film, frame: int, index: I64, points: F64, face: I64) -> None:
     """The places of points (N, 3) in one frame, and whether they are visible there."""
     tracks, view, rays = film.tracks, film.views[frame], film.scenes(frame).rays
-    frame_view = OtherView(view.k, view.world_from_camera, view.size, view.lens)
-    px, depth = frame_view.pixels(points)
+    px, depth = view.pixels(points)
     stored, hidden = tracks["points"][index, frame].astype(np.float64), tracks["occluded"][index, frame]  # fmt: skip
     with np.errstate(invalid="ignore"):
         front = (depth > 1e-3) & np.isfinite(px).all(1)
         off = np.abs(stored - px).max(1) > place_slack_px(px, depth)
         off |= np.abs(tracks["depth_m"][index, frame] - depth) > _DEPTH * (1 + np.abs(depth))
-    margin, name = frame_view.margin(px), view.folder.name
+    margin, name = view.margin(px), view.folder.name
     film.tally.add("tracks", len(index))
     film.list_points(index[front & off], f"is elsewhere in {name}")
     inside = np.flatnonzero(front & (margin > 0))
     visible = np.zeros(len(index), bool)
-    visible[inside] = is_seen(points[inside], frame_view, rays)
+    visible[inside] = is_seen(points[inside], view, rays)
     wrong = np.flatnonzero(hidden == visible)
-    wrong = wrong[~_may_be_either(points[wrong], frame_view, margin[wrong], rays)]
+    wrong = wrong[~_may_be_either(points[wrong], view, margin[wrong], rays)]
     # A face seen edge-on may hide its own points.
-    towards = points[wrong] - frame_view.eye
+    towards = points[wrong] - view.eye
     towards /= np.linalg.norm(towards, axis=1, keepdims=True)
     slant = dot(rays.normal(face[wrong], towards), towards)
     wrong = wrong[np.abs(slant) > _EDGE_ON]
@@ -172,7 +172,7 @@ def place_slack_px(px: F64, depth: F64) -> F64:
         return np.asarray(_PX + share * np.abs(px).max(axis=1))
 
 
-def _may_be_either(points: F64, other: OtherView, margin: F64, rays: Hits) -> Bools:
+def _may_be_either(points: F64, other: StoredCamera, margin: F64, rays: Hits) -> Bools:
     """(N,) True on the picture's border, or beside an obstacle."""
     with np.errstate(invalid="ignore"):
         is_tie = np.asarray(np.abs(margin) <= _PX, bool)

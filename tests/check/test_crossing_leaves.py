@@ -4,7 +4,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from pbrs_farm.check.cases import Scene
+from pbrs_farm.check.cases import Cast, Scene
 from pbrs_farm.check.embree_caster import Rays
 from pbrs_farm.check.pixel_checks import of_another_part
 
@@ -24,6 +24,7 @@ def test_of_two_crossing_surfaces_the_other_is_accepted_only_on_their_line() -> 
     rays = Rays(triangles)
     directions = np.array([[1e-5, 0.1, -1], [0.1, 0.1, -1], [-0.1, 0.1, -1], [0.9, 0.9, -1]])
     first = rays.first(np.zeros(3), directions)
-    faces = of_another_part(first, np.zeros(3), directions, Scene(triangles, rays))
+    scene, pixels = Scene(triangles, rays), np.zeros(4, int)
+    faces = of_another_part(Cast(scene, pixels, pixels, np.zeros(3), directions, first))
     assert first.tolist() == [1, 1, 0, -1]
     assert faces.tolist() == [0, -1, -1, -1]
