@@ -16,6 +16,7 @@ from pbrs_farm.check.cases import HouseCase
 from pbrs_farm.check.certificate import Expect
 from pbrs_farm.check.checks import Check
 from pbrs_farm.check.embree_caster import Rays
+from pbrs_farm.check.lens_rays import PlacedCamera, scaled_k
 from pbrs_farm.check.plan import is_within
 from pbrs_farm.check.rules import judge
 from pbrs_farm.core import keys
@@ -170,9 +171,8 @@ def count_range(case: HouseCase, instance: int, eye: F64, directions: F64) -> tu
 
 def _judged_rays(case: HouseCase, row: Mapping[str, Any], pose: F64) -> F64 | None:
     """(N, 3) directions of the pixels' rays at the size at which a view was judged; None if unknown."""
-    intrinsics = row["intrinsics"]
-    full_width, full_height = width, height = intrinsics["width_px"], intrinsics["height_px"]
-    fx, fy, cx, cy = (intrinsics[name] for name in ("fx", "fy", "cx", "cy"))
+    i = row["intrinsics"]
+    full_width, full_height = width, height = i["width_px"], i["height_px"]
     if case.house.recipe:
         fields = case.house.recipe["cameras"]
         width, height = fields["score_width_px"], fields["score_height_px"]
@@ -182,13 +182,10 @@ def _judged_rays(case: HouseCase, row: Mapping[str, Any], pose: F64) -> F64 | No
             if row["origin"] != "sampled":
                 return None
             height = max(round(width * full_height / full_width), 1)
-            fy = fx * (full_height / height) / (full_width / width)
-            cx, cy = full_width / 2, full_height / 2
-    columns, lines = np.meshgrid(np.arange(width) + 0.5, np.arange(height) + 0.5)
-    x = (columns.ravel() * full_width / width - cx) / fx
-    y = (lines.ravel() * full_height / height - cy) / fy
-    local = np.stack([x, -y, -np.ones(len(x))], axis=1)
-    return np.asarray(local @ pose[:3, :3].T)
+            fy = i["fx"] * (full_height / height) / (full_width / width)
+            i = {**i, "fy": fy, "cx": full_width / 2, "cy": full_height / 2}
+    camera = PlacedCamera(scaled_k(i, width, height), opencv_pose(pose), (height, width))
+    return camera.ray_grid().reshape(-1, 3)
 
 
 def _check_sequence(case: HouseCase, rows: list[dict[str, Any]]) -> None:

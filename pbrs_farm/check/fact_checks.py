@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from pbrs_farm.check.axes import into_frame, is_rigid
 from pbrs_farm.check.cases import ViewCase
 from pbrs_farm.check.checks import Check
+from pbrs_farm.check.lens_rays import scaled_k
 from pbrs_farm.check.rules import judge
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
@@ -70,11 +71,7 @@ def _check_camera_row(case: ViewCase) -> None:
     if not case.expect("camera file")(row is not None, "is not in cameras.json"):
         return
     assert row is not None
-    intrinsics = row["intrinsics"]
-    height, width = view.size
-    x, y = width / intrinsics["width_px"], height / intrinsics["height_px"]
-    fx, fy, cx, cy = (intrinsics[name] for name in ("fx", "fy", "cx", "cy"))
-    k = [[fx * x, 0, cx * x], [0, fy * y, cy * y], [0, 0, 1]]
+    k = scaled_k(row["intrinsics"], *view.size[::-1])
     judge("camera file", case.place, tally, view=view.table, row=row, K=k)
     if view.lens is not None:
         depth = "planar" if view.lens.model in ("radtan", "opencv") else "distance"

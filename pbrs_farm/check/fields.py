@@ -27,12 +27,6 @@ class FieldRow(Record):
     why: str = ""
 
 
-@functools.cache
-def field_rows() -> tuple[FieldRow, ...]:
-    """The table, fields.csv, in which the first row that fits a field counts."""
-    return read_csv(Path(__file__).parent / "fields.csv", FieldRow)
-
-
 def fields_of(value: Any, path: str = "") -> Iterator[str]:
     """The paths of a JSON value's fields: keys behind dots, [] for each entry of a list of objects.
 
@@ -56,15 +50,7 @@ def _word(key: str) -> str:
 
 def owner_of(file: str, field: str) -> FieldRow | None:
     """The row of a field; None for an unknown field."""
-    return _owner(file, tuple(field.split(".")))
-
-
-@functools.cache
-def _owner(file: str, parts: tuple[str, ...]) -> FieldRow | None:
-    for row in field_rows():
-        if row.file == file and _fits(tuple(row.field.split(".")), parts):
-            return row
-    return None
+    return row_and_names(file, field, "fields")[0]
 
 
 def _fits(pattern: tuple[str, ...], parts: tuple[str, ...]) -> bool:
@@ -76,9 +62,9 @@ def _fits(pattern: tuple[str, ...], parts: tuple[str, ...]) -> bool:
 
 
 @functools.cache
-def _rows_of_sets() -> tuple[tuple[FieldRow, re.Pattern[str]], ...]:
-    """The rows of set_fields.csv with the patterns of their files."""
-    rows = read_csv(Path(__file__).with_name("set_fields.csv"), FieldRow)
+def _rows(table: str) -> tuple[tuple[FieldRow, re.Pattern[str]], ...]:
+    """The rows of a table with the patterns of their files; the first that fits a field counts."""
+    rows = read_csv(Path(__file__).with_name(f"{table}.csv"), FieldRow)
     return tuple((row, re.compile(_pattern(row.file))) for row in rows)
 
 
@@ -88,13 +74,16 @@ def _pattern(file: str) -> str:
     return re.sub(r"\\{(house|view|key)\\}", r"(?P<\1>[^/]+?)", text)
 
 
-def row_and_names(file: str, field: str = "") -> tuple[FieldRow | None, dict[str, str]]:
+@functools.cache
+def row_and_names(
+    file: str, field: str = "", table: str = "set_fields"
+) -> tuple[FieldRow | None, dict[str, str]]:
     """The row of a field of a set's file, and the names in the file's name; None for an unknown one.
 
     file: of a form with its word, below its split. field: "" for a file as a whole.
     """
     parts = tuple(field.split("."))
-    for row, pattern in _rows_of_sets():
+    for row, pattern in _rows(table):
         match = pattern.fullmatch(file)
         if match and _fits(tuple(row.field.split(".")), parts):
             return row, match.groupdict()

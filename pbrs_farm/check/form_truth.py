@@ -13,6 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from pbrs_farm.check.lens_rays import PlacedCamera, StoredCamera
 from pbrs_farm.check.stored_set import MODES
 from pbrs_farm.check.stored_view import StoredView
 from pbrs_farm.core.arrays import F64, Bools
@@ -186,47 +187,40 @@ def whole_centres(k: F64) -> F64:
     return np.asarray(k - [[0, 0, 0.5], [0, 0, 0.5], [0, 0, 0]])
 
 
-class _Frame:
-    """A view with depth, as covisibility compares it with others."""
+def _grid_of(camera: StoredCamera, depth: F64) -> tuple[F64, int]:
+    """(N, 3) world points of a grid of pixels with depth, and the number of pixels of the grid."""
+    scale = min(1.0, _GRID_PX / max(depth.shape))
+    lines = [
+        np.floor((np.arange(int(n * scale)) + 0.5) * n / int(n * scale)).astype(int)
+        for n in depth.shape
+    ]
+    y, x = (g.ravel() for g in np.meshgrid(*lines, indexing="ij"))
+    z = depth[y, x]
+    eye, directions = camera.rays(y, x)
+    return (eye + directions * z[:, None])[z > 0], len(z)
 
-    def __init__(self, truth: FormTruth, depth: F64) -> None:
-        self.depth, self.k = depth, np.array(truth.facts["K"], np.float64)
-        self.pose = truth.view.world_from_camera
 
-    def grid(self) -> tuple[F64, int]:
-        """(N, 3) world points of a grid of pixels with depth, and the number of pixels of the grid."""
-        scale = min(1.0, _GRID_PX / max(self.depth.shape))
-        lines = [
-            np.floor((np.arange(int(n * scale)) + 0.5) * n / int(n * scale)).astype(int)
-            for n in self.depth.shape
-        ]
-        y, x = (g.ravel() for g in np.meshgrid(*lines, indexing="ij"))
-        z = self.depth[y, x]
-        local = np.linalg.solve(self.k, np.stack([x + 0.5, y + 0.5, np.ones(len(x))])) * z
-        world = self.pose[:3, :3] @ local + self.pose[:3, 3:]
-        return world.T[z > 0], len(z)
-
-    def sees(self, points: F64) -> Bools:
-        """True for points in the picture that nothing hides."""
-        local = (points - self.pose[:3, 3]) @ self.pose[:3, :3]
-        z = local[:, 2]
-        is_ahead = z > _NEAREST_M
-        x, y, _w = self.k @ (local / np.where(is_ahead, z, 1)[:, None]).T
-        column, row = np.floor(x), np.floor(y)
-        height, width = self.depth.shape
-        is_in = is_ahead & (column >= 0) & (column < width) & (row >= 0) & (row < height)
-        depth = np.zeros_like(z)
-        depth[is_in] = self.depth[row[is_in].astype(int), column[is_in].astype(int)]
-        allowed = 0.1 + 0.005 * z - math.log(0.5) * 0.1
-        return np.asarray(is_in & (depth > 0) & (np.abs(depth - z) < allowed))
+def _n_seen(camera: StoredCamera, depth: F64, points: F64) -> int:
+    """Number of points in the picture that nothing hides."""
+    px, z = camera.pixels(points)
+    with np.errstate(invalid="ignore"):
+        is_in = (z > _NEAREST_M) & (px >= 0).all(1) & (px < depth.shape[::-1]).all(1)
+    columns, rows = np.floor(px[is_in]).astype(int).T
+    stored, z = depth[rows, columns], z[is_in]
+    allowed = 0.1 + 0.005 * z - math.log(0.5) * 0.1
+    return int(((stored > 0) & (np.abs(stored - z) < allowed)).sum())
 
 
 def covisibility(truths: Sequence[FormTruth], depths: Sequence[F64]) -> dict[int, F64]:
     """Row -> shares of its frame's grid that each frame sees, of some rows spread over the scene."""
-    frames = [_Frame(*pair) for pair in zip(truths, depths, strict=True)]
-    rows = np.unique(np.linspace(0, len(frames) - 1, min(_ROWS, len(frames))).astype(int))
+    cameras = [
+        PlacedCamera(np.array(t.facts["K"], np.float64), t.view.world_from_camera, t.shape)
+        for t in truths
+    ]
+    rows = np.unique(np.linspace(0, len(cameras) - 1, min(_ROWS, len(cameras))).astype(int))
     shares = {}
     for row in rows.tolist():
-        points, n = frames[row].grid()
-        shares[row] = np.array([frame.sees(points).sum() / n for frame in frames])
+        points, n = _grid_of(cameras[row], depths[row])
+        seen = [_n_seen(*pair, points) for pair in zip(cameras, depths, strict=True)]
+        shares[row] = np.array(seen) / n
     return shares

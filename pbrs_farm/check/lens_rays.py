@@ -6,6 +6,7 @@ bisection of the radius and by fixed-point steps for the tangential and prism pa
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
@@ -18,6 +19,13 @@ from pbrs_farm.core.arrays import F64
 _BENT = ("radtan", "opencv")  # pinholes with distortion
 _HALVINGS = 60
 _FARTHEST_FOLD = 50.0  # radius at z = 1, within which a fold is looked for
+# Right, down and forward of the faces front, right, back, left, up and down.
+_CUBE = np.array(
+    [
+        np.diag([1.0, 1, 1]), [[0, 0, -1], [0, 1, 0], [1, 0, 0]], np.diag([-1, 1, -1]),
+        [[0, 0, 1], [0, 1, 0], [-1, 0, 0]], [[1, 0, 0], [0, 0, 1], [0, -1, 0]], [[1, 0, 0], [0, 0, -1], [0, 1, 0]],
+    ]
+)  # fmt: skip
 _STEPS = 200  # of the fixed point; a third of a pixel of tangential part needs few
 
 
@@ -174,38 +182,27 @@ def _through(plane: F64, homography: F64) -> F64:
 
 def _cube_rays(plane: F64) -> F64:
     number = np.clip(np.floor((plane[:, 0] + 1) / 2), 0, 5).astype(np.int64)
-    u, v, ones = plane[:, 0] - 2 * number, plane[:, 1], np.ones(len(plane))
-    # Right, down and forward of the faces front, right, back, left, up and down.
-    faces = [
-        (u, v, ones),
-        (ones, v, -u),
-        (-u, v, -ones),
-        (-ones, v, u),
-        (u, -ones, v),
-        (u, ones, -v),
-    ]
-    rays = np.zeros((len(plane), 3))
-    for k, parts in enumerate(faces):
-        rays[number == k] = np.stack(parts, axis=1)[number == k]
+    local = np.stack([plane[:, 0] - 2 * number, plane[:, 1], np.ones(len(plane))], axis=1)
+    rays = np.einsum("nk,nkc->nc", local, _CUBE[number])
     return np.asarray(rays / np.linalg.norm(rays, axis=1, keepdims=True))
 
 
 def _cube_plane(points: F64) -> F64:
-    x, y, z = points.T
-    ax, ay, az = np.abs(points).T
-    with np.errstate(divide="ignore", invalid="ignore"):
-        faces = {
-            0: ((z >= ax) & (z >= ay), x / z, y / z),
-            1: ((x >= az) & (x >= ay), -z / x, y / x),
-            2: ((-z >= ax) & (-z >= ay), x / z, -y / z),
-            3: ((-x >= az) & (-x >= ay), -z / x, -y / x),
-            4: ((-y >= ax) & (-y >= az), -x / y, -z / y),
-            5: ((y >= ax) & (y >= az), x / y, -z / y),
-        }
     out = np.full((len(points), 2), np.nan)
-    for k, (inside, u, v) in faces.items():
-        out[inside] = np.stack([u + 2 * k, v], axis=1)[inside]
+    for k, face in enumerate(_CUBE):
+        x, y, z = face @ points.T
+        inside = (z >= np.abs(x)) & (z >= np.abs(y))
+        with np.errstate(divide="ignore", invalid="ignore"):
+            out[inside] = np.stack([x / z + 2 * k, y / z], axis=1)[inside]
     return out
+
+
+def scaled_k(intrinsics: Mapping[str, Any], width: float, height: float) -> F64:
+    """(3, 3) K of a camera of cameras.json for a picture of another size."""
+    i = intrinsics
+    k = np.array([[i["fx"], 0, i["cx"]], [0, i["fy"], i["cy"]], [0, 0, 1]], np.float64)
+    k[:2] *= [[width / i["width_px"]], [height / i["height_px"]]]
+    return k
 
 
 class StoredCamera:

@@ -420,10 +420,7 @@ def _check_windows(case: ViewCase) -> None:
     """By day, pixels that show the outdoors have daylight, and hardly any light of lamps."""
     if not case.house.rooms or _sky(case).get("sky_lx", 0.0) < _DAY_LX:
         return
-    height, width = case.view.size
-    rng = np.random.default_rng(zlib.crc32(f"{case.place} windows".encode()))
-    index = rng.choice(height * width, min(_WINDOW_RAYS, height * width), replace=False)
-    rows, columns = index // width, index % width
+    rows, columns = case.sample(_WINDOW_RAYS)
     origin, directions = case.view.rays(rows, columns)
     inside = case.now.shared(LitScene).inside
     through = directions.any(axis=1) & (inside.first(origin, directions) < 0)

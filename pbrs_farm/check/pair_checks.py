@@ -14,7 +14,7 @@ from pbrs_farm.check.axes import opencv_pose
 from pbrs_farm.check.cases import HouseCase
 from pbrs_farm.check.checks import Check
 from pbrs_farm.check.embree_caster import Rays, is_visible
-from pbrs_farm.check.lens_rays import PlacedCamera, StoredLens
+from pbrs_farm.check.lens_rays import PlacedCamera, StoredLens, scaled_k
 from pbrs_farm.check.rules import judge
 from pbrs_farm.check.stored_files import BadFile, stored_bytes, stored_object
 
@@ -76,10 +76,10 @@ def _check_row(case: HouseCase, row: dict[str, Any], views: list[dict[str, Any]]
 def _camera(row: Mapping[str, Any]) -> PlacedCamera:
     """A camera of cameras.json with the grid's pixels."""
     i = row["intrinsics"]
-    k = np.array([[i["fx"], 0, i["cx"]], [0, i["fy"], i["cy"]], [0, 0, 1]], np.float64)
-    k[:2] *= np.array([[_GRID[0] / i["width_px"]], [_GRID[1] / i["height_px"]]])
     lens = StoredLens.of(i["lens"]) if "lens" in i else None
-    return PlacedCamera(k, opencv_pose(row["world_from_camera_opengl"]), _GRID[::-1], lens)
+    return PlacedCamera(
+        scaled_k(i, *_GRID), opencv_pose(row["world_from_camera_opengl"]), _GRID[::-1], lens
+    )
 
 
 def _share(camera: PlacedCamera, other: PlacedCamera, rays: Rays) -> float:

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy import ndimage
 
 from pbrs_farm.check.cases import ViewCase
 from pbrs_farm.check.checks import Check
@@ -57,13 +58,11 @@ def moved_copies(picture: NDArray[Any]) -> dict[str, NDArray[Any]]:
 
 def _outline(instance: NDArray[Any]) -> Bools:
     """(H, W) pixels beside another instance."""
-    outline = np.zeros(instance.shape, bool)
-    across, down = instance[:, 1:] != instance[:, :-1], instance[1:] != instance[:-1]
-    outline[:, 1:] |= across
-    outline[:, :-1] |= across
-    outline[1:] |= down
-    outline[:-1] |= down
-    return outline
+    cross = ndimage.generate_binary_structure(2, 1)
+    most, least = (
+        f(instance, footprint=cross) for f in (ndimage.maximum_filter, ndimage.minimum_filter)
+    )
+    return np.asarray(most != least, bool)
 
 
 def _steps(picture: NDArray[Any]) -> F64:

@@ -1,6 +1,6 @@
 """Answers of an export of questions, recomputed from the stored files of its root.
 
-Effects: reads files. Distances come from points on house.glb's meshes, read with trimesh; everything else
+Effects: reads files. Distances come from points on house.glb's triangles; everything else
 from view.json, house.json and the question's words. Imports no code of export.
 """
 
@@ -14,10 +14,11 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import trimesh
 from numpy.typing import NDArray
 from scipy.spatial import cKDTree
 
+from pbrs_farm.check.plan import is_within, polygon_area
+from pbrs_farm.check.stored_mesh import triangles_from_glb
 from pbrs_farm.images import array_from_png
 
 Array = NDArray[np.float64]
@@ -36,34 +37,16 @@ _OWN_WORDS: Final = {
 
 
 class _Home:
-    """The meshes of a house.glb as points, cached."""
+    """The triangles of a house.glb as points, cached."""
 
     def __init__(self, file: Path) -> None:
-        self._scene = trimesh.load(file, force="scene")
-        parents = self._scene.graph.transforms.parents
-        self._nodes: dict[str, list[str]] = {}
-        for name in self._scene.graph.nodes_geometry:
-            for node in {name, parents.get(name)}:
-                self._nodes.setdefault(str(node), []).append(name)
-        self._points: dict[str, Array] = {}
-        self._trees: dict[str, cKDTree] = {}
+        self._triangles = triangles_from_glb(file.read_bytes())
+        self.tree = lru_cache(maxsize=None)(self._tree)
 
-    def points(self, node: str) -> Array:
-        """Points on the meshes of a node and its children, none farther than _SPACING_M from the next."""
-        if node not in self._points:
-            parts = []
-            for name in self._nodes[node]:
-                transform, geometry = self._scene.graph[name]
-                mesh = self._scene.geometry[geometry].copy().apply_transform(transform)
-                parts.append(_points_on(np.asarray(mesh.triangles)))
-            self._points[node] = np.concatenate(parts)
-        return self._points[node]
-
-    def tree(self, node: str) -> cKDTree:
-        """A search tree of the same points."""
-        if node not in self._trees:
-            self._trees[node] = cKDTree(self.points(node))
-        return self._trees[node]
+    def _tree(self, instance: int) -> cKDTree:
+        """A search tree of points on an item's surface, none farther than _SPACING_M from the next."""
+        corners = self._triangles.points_of(self._triangles.instance == instance)
+        return cKDTree(_points_on(corners.reshape(-1, 3, 3)))
 
 
 def _points_on(triangles: Array) -> Array:
@@ -106,6 +89,7 @@ class _Scene:
             tables = [t for t in frames if kept is None or (house, t["view"]) in kept]
             tables.sort(key=lambda t: int(t["frame"]))
         self.views = tables
+        self.eyes = [np.array(t["world_from_camera_opencv"])[:3, 3] for t in tables]
         self.house = json.loads((self.folder / "house.json").read_text())
         self.rows: dict[int, dict[str, Any]] = {}
         for table in tables:
@@ -114,18 +98,9 @@ class _Scene:
                 if row["fraction"] > best["fraction"]:
                     self.rows[row["id"]] = row
 
-    @property
-    def home(self) -> _Home:
-        """The meshes, read on demand."""
-        return _home(self.folder / "house.glb")
-
-    def points(self, instance: int) -> Array:
-        """Points on an item's surface, none farther than _SPACING_M from the next."""
-        return self.home.points(self.rows[instance]["item"])
-
     def tree(self, instance: int) -> cKDTree:
-        """A search tree of the same points."""
-        return self.home.tree(self.rows[instance]["item"])
+        """Points on an item's surface, read on demand."""
+        return _home(self.folder / "house.glb").tree(instance)
 
     def depth(self, instance: int) -> float:
         """Median depth of its pixels in the first view, mm; inf if unknown."""
@@ -260,7 +235,7 @@ def _fits(row: dict[str, Any], word: str) -> bool:
 
 
 def _gap_m(scene: _Scene, a: int, b: int) -> float:
-    tree, points = scene.tree(b), scene.points(a)
+    tree, points = scene.tree(b), scene.tree(a).data
     # A sample of the points bounds the distance, which excludes most others.
     bound = float(np.min(tree.query(points[:: max(1, len(points) // 500)])[0]))
     nearer = tree.query(points, distance_upper_bound=bound + 1e-9)[0]
@@ -290,7 +265,7 @@ def _fault_of_hidden(scene: _Scene, about: list[int]) -> str:
         return f"{len(hidden)} of the two are hidden"
     item, table = scene.house["items"][hidden[0] - 1], scene.views[0]
     pose = np.array(table["world_from_camera_opencv"])
-    ahead = (scene.home.points(item["id"]) - pose[:3, 3]) @ pose[:3, 2]
+    ahead = (scene.tree(item["instance"]).data - pose[:3, 3]) @ pose[:3, 2]
     is_there = item["room_id"] == table["room"] and bool((ahead > 0).mean() > 0.5)
     return "" if is_there else f"instance {hidden[0]} is not in front of the camera"
 
@@ -325,11 +300,7 @@ def _n_visits(scene: _Scene, question: str) -> int:
     if not rooms:
         return 0
     room = max(rooms, key=lambda r: len(r["name"]))
-    ring = np.array(room["polygon"])
-    eyes = [np.array(t["world_from_camera_opencv"])[:3, 3] for t in scene.views]
-    is_in = [
-        room["floor_y"] <= e[1] <= room["ceiling_y"] and _is_inside(ring, e[[0, 2]]) for e in eyes
-    ]
+    is_in = [_is_in(room, eye) for eye in scene.eyes]
     return sum(now and not before for before, now in zip([False, *is_in], is_in, strict=False))
 
 
@@ -342,26 +313,13 @@ def _first_frame(scene: _Scene, instance: int) -> int:
 
 
 def _area_entered_m2(scene: _Scene) -> float:
-    eyes = [np.array(t["world_from_camera_opencv"])[:3, 3] for t in scene.views]
-    total = 0.0
-    for room in scene.house["rooms"]:
-        ring = np.array(room["polygon"])
-        if any(
-            room["floor_y"] <= e[1] <= room["ceiling_y"] and _is_inside(ring, e[[0, 2]])
-            for e in eyes
-        ):
-            x, z = ring.T
-            total += abs(float(np.sum(x * np.roll(z, -1) - np.roll(x, -1) * z))) / 2
-    return total
+    entered = (room for room in scene.house["rooms"] if any(_is_in(room, e) for e in scene.eyes))
+    return sum(polygon_area(np.array(room["polygon"], np.float64)) for room in entered)
 
 
-def _is_inside(ring: Array, place: Array) -> bool:
-    """By the number of crossings of a ray along x."""
-    a, b = ring, np.roll(ring, -1, axis=0)
-    crosses = (a[:, 1] > place[1]) != (b[:, 1] > place[1])
-    with np.errstate(divide="ignore", invalid="ignore"):
-        crossings = a[:, 0] + (place[1] - a[:, 1]) / (b[:, 1] - a[:, 1]) * (b[:, 0] - a[:, 0])
-    return bool((crosses & (crossings > place[0])).sum() % 2)
+def _is_in(room: dict[str, Any], eye: Array) -> bool:
+    is_level = room["floor_y"] <= eye[1] <= room["ceiling_y"]
+    return bool(is_level and is_within(room["polygon"], eye[[0, 2]]))
 
 
 def _fault_of_route(scene: _Scene, stops: list[int], turns: list[str]) -> str:
