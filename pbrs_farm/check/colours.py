@@ -31,9 +31,9 @@ def luminance_of(channels: Mapping[str, F32], name: str) -> F64:
     return np.asarray(rgb_of(channels, name) @ LUMINANCE)
 
 
-def rgb_of(channels: Mapping[str, F32], name: str) -> F64:
-    """(H, W, 3) the channels name.R, name.G and name.B."""
-    return np.stack([channels[f"{name}.{c}"] for c in "RGB"], axis=-1).astype(np.float64)
+def rgb_of(channels: Mapping[str, F32], name: str, axes: str = "RGB") -> F64:
+    """(H, W, 3) the channels name.R, name.G and name.B, or of other axes."""
+    return np.stack([channels[f"{name}.{c}"] for c in axes], axis=-1).astype(np.float64)
 
 
 def has_channels(

@@ -9,6 +9,7 @@ import numpy as np
 
 from pbrs_farm.check.cases import Channels
 from pbrs_farm.check.certificate import Tally
+from pbrs_farm.check.colours import has_channels, rgb_of
 from pbrs_farm.check.developing import halved
 from pbrs_farm.check.stored_view import StoredView
 from pbrs_farm.core.arrays import F32
@@ -20,11 +21,10 @@ def stored_light(
     view: StoredView, channels: Channels, is_halved: bool, tally: Tally
 ) -> Planes | None:
     """Light groups (at half size if is_halved), albedo and normal; None if a channel is missing."""
-    names = {g: [f"{g}.{c}" for c in "RGB"] for g in ("outdoor", "indoor", "albedo")}
-    names["normal"] = [f"normal.{c}" for c in "XYZ"]
-    if not all(n in channels for row in names.values() for n in row):
+    if not has_channels(channels, view.size, "outdoor indoor albedo", "normal"):
         return None  # reported by the check of radiance
-    planes = {g: np.stack([channels[n] for n in row], axis=-1) for g, row in names.items()}
+    groups = {"outdoor": "RGB", "indoor": "RGB", "albedo": "RGB", "normal": "XYZ"}
+    planes = {g: rgb_of(channels, g, axes).astype(np.float32) for g, axes in groups.items()}
     if is_halved:
         planes = {g: halved(plane) for g, plane in planes.items()}
     return denoised_light(view, planes, tally)

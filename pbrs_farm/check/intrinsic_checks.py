@@ -129,7 +129,7 @@ def _divided(case: ViewCase, raw: Mapping[str, F64]) -> Planes:
         for group in ("outdoor", "indoor")
     }  # fmt: skip
     planes["albedo"] = np.where(albedo > 0, 0.5, 0.0)
-    planes["normal"] = np.stack([case.light[f"normal.{c}"] for c in "XYZ"], axis=-1)
+    planes["normal"] = rgb_of(case.light, "normal", "XYZ")
     return {name: plane.astype(np.float32) for name, plane in planes.items()}
 
 

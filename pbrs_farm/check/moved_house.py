@@ -60,7 +60,7 @@ def house_at(house: StoredHouse, triangles: Triangles, time_s: float | None) -> 
         instance = instances[str(motion["item"])]
         row, faces = rows[instance], triangles.instance == instance
         if motion["part"]:
-            pose = _joint_pose(motion, row, time_s)
+            pose = _pose_of_part(motion, row, time_s)
             faces &= triangles.is_part(motion["part"])
         else:
             pose = body_pose(motion, time_s)
@@ -92,18 +92,24 @@ def joint_value(motion: Mapping[str, Any], time_s: float) -> float:
     return float(np.interp(time_s, motion["times_s"], [v[0] for v in motion["values"]]))
 
 
-def _joint_pose(motion: Mapping[str, Any], row: dict[str, Any], time_s: float) -> F64:
-    """(4, 4) movement of a part from rest; writes its value into the item's row."""
-    value = joint_value(motion, time_s)
-    joints = [dict(joint) for joint in row["joints"]]
-    joint = next(j for j in joints if j["part"] == motion["part"])
-    by, axis = value - joint["value"], np.array(joint["axis"], np.float64)
-    joint["value"], row["joints"] = value, joints
+def joint_pose(joint: Mapping[str, Any], by: float) -> F64:
+    """(4, 4) movement of a joint's part, by radians or metres."""
+    axis = np.array(joint["axis"], np.float64)
     if joint["kind"] == "prismatic":
         return _pose(np.eye(3), by * axis)
     rotation = Rotation.from_rotvec(by * axis).as_matrix()
     point = np.array(joint["point"], np.float64)
     return _pose(rotation, point - rotation @ point)
+
+
+def _pose_of_part(motion: Mapping[str, Any], row: dict[str, Any], time_s: float) -> F64:
+    """(4, 4) movement of a part from rest; writes its value into the item's row."""
+    value = joint_value(motion, time_s)
+    joints = [dict(joint) for joint in row["joints"]]
+    joint = next(j for j in joints if j["part"] == motion["part"])
+    by = value - joint["value"]
+    joint["value"], row["joints"] = value, joints
+    return joint_pose(joint, by)
 
 
 def body_pose(motion: Mapping[str, Any], time_s: float) -> F64:

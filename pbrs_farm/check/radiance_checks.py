@@ -17,7 +17,7 @@ from scipy import ndimage
 from pbrs_farm.check.axes import dot, world_normals
 from pbrs_farm.check.cases import SAMPLE, ViewCase
 from pbrs_farm.check.checks import Check
-from pbrs_farm.check.colours import has_channels, linear_from_srgb, luminance_of
+from pbrs_farm.check.colours import has_channels, linear_from_srgb, luminance_of, rgb_of
 from pbrs_farm.check.developing import tile_means
 from pbrs_farm.check.finishes import has_roughness
 from pbrs_farm.check.picture_checks import moved_copies
@@ -98,9 +98,7 @@ def check_guides(case: ViewCase) -> None:
     # The guide contains all reflected light, also that of a coat.
     albedo += np.where(coated_materials(house)[triangles.material[face]], COAT, 0.0)[:, None]
     guides = [
-        np.stack([channels[f"{g}.{c}"][cast.rows, cast.columns] for c in axes], axis=1).astype(
-            np.float64
-        )
+        rgb_of(channels, g, axes)[cast.rows, cast.columns]
         for g, axes in (("albedo", "RGB"), ("normal", "XYZ"))
     ]
     close = np.abs(guides[0] - albedo).max(axis=1) <= _GUIDE_ALBEDO
