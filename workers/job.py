@@ -13,8 +13,9 @@ from pbrs_farm.core.options import option
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.core.record import Record
 from pbrs_farm.run.request import ModelsOption, Request, Wanted
+from pbrs_farm.store import Store
 from pbrs_farm.store.pack import FORMAT
-from workers.ids import DEFAULT_PRIORITY, GL, LEAST_URGENT, LIGHT
+from workers.ids import DEFAULT_PRIORITY, GL, LEAST_URGENT, LIGHT, job_key
 
 
 @cache
@@ -161,6 +162,11 @@ def job_id(spec: JobSpec, houses: Iterable[HouseEntry]) -> str:
 def lines_from_houses(houses: Iterable[HouseEntry]) -> bytes:
     """houses.jsonl: a house a line in the job's order, by which shards are cut."""
     return "".join(house.model_dump_json() + "\n" for house in houses).encode()
+
+
+def stored_houses(store: Store, job: str) -> Iterator[HouseEntry]:
+    """The houses of a stored job, in its order."""
+    return houses_from_lines(store.get(job_key(job, "houses.jsonl")))
 
 
 def houses_from_lines(data: bytes) -> Iterator[HouseEntry]:

@@ -124,7 +124,7 @@ class Farm:
         # Storage first: from here on the job can be recovered.
         claim_root(self.store, spec.recipe, update=update)
         self.store.put(job_key(spec.job_id, "houses.jsonl"), lines_from_houses(houses))
-        self.store.put(job_key(spec.job_id), spec.model_dump_json(indent=1).encode())
+        self._put_spec(spec)
         was = self._load(spec, list(houses))
         self.rights.note("submit", spec.job_id, f"{len(houses)} houses, {spec.recipe.name}")
         return Submitted(spec.job_id, len(houses), was)
@@ -163,12 +163,12 @@ class Farm:
         progress: called with lines for people. Raises BadInput for a job that is not in the store, and for
         another user's.
         """
-        from workers.job import houses_from_lines
+        from workers.job import stored_houses
 
         self.users.restore(self.store)
         spec = self.spec(job)
         self.rights.check_owner(job, spec.user)
-        houses = [*houses_from_lines(self.store.get(job_key(job, "houses.jsonl")))]
+        houses = [*stored_houses(self.store, job)]
         self._load(spec, houses, progress)
         self.rights.note("recover", job, f"{len(houses)} houses")
         view = self.ledger.view(job)
@@ -184,8 +184,16 @@ class Farm:
         if spec.version != work_version():
             before = (*spec.versions_before, spec.version)
             spec = spec.model_copy(update={"version": work_version(), "versions_before": before})
-            self.store.put(job_key(job), spec.model_dump_json(indent=1).encode())
+            self._put_spec(spec)
         return self.recover(job, progress)
+
+    def _put_spec(self, spec: JobSpec) -> None:
+        self.store.put(job_key(spec.job_id), spec.model_dump_json(indent=1).encode())
+
+    def _change_spec(self, job: str, **fields: Any) -> None:
+        """Change the stored specification, so that a recovered job keeps it; steering works without a store."""
+        if self.config.store_url:
+            self._put_spec(self.spec(job).model_copy(update=fields))
 
     def spec(self, job: str) -> JobSpec:
         """The job's specification from the store, later changes included; BadInput for an unknown or invalid id."""
@@ -276,9 +284,9 @@ class Farm:
 
     def finished_houses(self, job: str, besides: Collection[str] = ()) -> set[str]:
         """The job's finished houses but those in besides, one field each: suits following a large job."""
-        from workers.job import houses_from_lines
+        from workers.job import stored_houses
 
-        entries = houses_from_lines(self.store.get(job_key(check_job_id(job), "houses.jsonl")))
+        entries = stored_houses(self.store, check_job_id(job))
         candidates = (e.house_id for e in entries if e.house_id not in besides)
         return set(self.ledger.finished(job, candidates))
 
@@ -365,10 +373,7 @@ class Farm:
     def set_priority(self, job: str, priority: int) -> str:
         """Order a user's jobs by priorities 0 (first) to 9 from the next turn on; the job's state."""
         state = self._steer(job, "priority", str(priority))
-        # A recovered job keeps it; steering alone may work without a store.
-        if self.config.store_url:
-            spec = self.spec(job).model_copy(update={"priority": priority})
-            self.store.put(job_key(job), spec.model_dump_json(indent=1).encode())
+        self._change_spec(job, priority=priority)
         return state
 
     def limit(
@@ -385,9 +390,7 @@ class Farm:
             raise BadInput("limit", "", "nothing to change", hint="--max-slots N, --budget HOURS")
         for name, number in chosen.items():
             state = self._steer(job, name, f"{number:g}")
-        if self.config.store_url:
-            spec = self.spec(job).model_copy(update=chosen)
-            self.store.put(job_key(job), spec.model_dump_json(indent=1).encode())
+        self._change_spec(job, **chosen)
         return state
 
     def drain(self, worker: str, *, undo: bool = False) -> None:
@@ -432,19 +435,15 @@ class Farm:
         return was
 
     def _steer(self, job: str, what: str, reason: str = "") -> str:
-        view = self.ledger.view(check_job_id(job))
-        if view is None:
-            raise BadInput(job, "", "not in the ledger", hint="`recover` rebuilds it from storage")
-        self.rights.check_owner(job, view.user)
+        self.rights.check_owner(job, self.view(job).user)
         state = self.ledger.steer(job, what, reason)
         self.rights.note(what, job, f"{reason}, {state}" if reason else state)
         return state
 
     def _explain_not_admitted(self, job: str, house: str) -> list[dict[str, Any]]:
-        from workers.job import houses_from_lines
+        from workers.job import stored_houses
 
-        data = self.store.get(job_key(check_job_id(job), "houses.jsonl"))
-        houses = [entry.house_id for entry in houses_from_lines(data)]
+        houses = [entry.house_id for entry in stored_houses(self.store, check_job_id(job))]
         if house not in houses:
             raise BadInput(house, "", "the job has no such house", hint=did_you_mean(house, houses))
         return [{"task": house, "state": "its house is not admitted yet"}]

@@ -16,6 +16,7 @@ from typing import TYPE_CHECKING, Final, Literal
 from pbrs_farm.core import keys
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.store.object_store import Store, get_or_none
+from workers.coordinator.recover import jobs_in
 from workers.ids import job_key
 from workers.job import houses_from_lines
 
@@ -88,12 +89,6 @@ def remove(farm: Farm, groups: Iterable[Garbage]) -> int:
                 if next(iter(farm.store.list(f"jobs/{job}/")), None) is None:
                     farm.ledger.forget(job)
     return n
-
-
-def jobs_in(store: Store) -> list[str]:
-    """The jobs that a store has objects of."""
-    ends = (key.split("/") for key in store.list("jobs/"))
-    return sorted({parts[1] for parts in ends if len(parts) == 3 and parts[2] == "job.json"})
 
 
 def _state_of_job(farm: Farm, job: str) -> str:

@@ -10,8 +10,8 @@ from collections.abc import Callable
 from typing import TYPE_CHECKING
 
 from pbrs_farm.core.errors import BadInput
-from workers.ids import GEOMETRY, TaskId, job_key, task_from_text
-from workers.job import houses_from_lines
+from workers.ids import GEOMETRY, TaskId, task_from_text
+from workers.job import stored_houses
 from workers.runner import Result, TaskRequest, runner_maker
 
 if TYPE_CHECKING:
@@ -43,7 +43,7 @@ def _views(farm: Farm, job: str, task: TaskId) -> tuple[str, ...]:
 
 def _source_of_house(farm: Farm, job: str, house: str) -> str:
     """The house's source as submitted, from the store."""
-    for entry in houses_from_lines(farm.store.get(job_key(job, "houses.jsonl"))):
+    for entry in stored_houses(farm.store, job):
         if entry.house_id == house:
             return entry.source
     raise BadInput(house, "", "the job has no such house")

@@ -17,7 +17,7 @@ from typing import Final
 from pbrs_farm.core import keys
 from pbrs_farm.store.laid_out import LaidOutStore
 from pbrs_farm.store.object_store import Store, get_or_none
-from workers.ids import GEOMETRY, REDUCE
+from workers.ids import GEOMETRY, REDUCE, job_key
 from workers.job import HouseEntry, JobSpec
 from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.task_ledger import HouseState
@@ -55,7 +55,12 @@ def lost_jobs(ledger: RedisLedger, store: Store) -> list[str]:
     """Jobs, by id, that the store knows and an empty ledger does not; [] where it holds any job."""
     if ledger.known_jobs():
         return []
-    ends = [key.split("/") for key in store.list("jobs/") if key.endswith("/job.json")]
+    return jobs_in(store)
+
+
+def jobs_in(store: Store) -> list[str]:
+    """The jobs, by id, that a store has a description of."""
+    ends = (key.split("/") for key in store.list("jobs/") if key.endswith("/job.json"))
     return sorted(parts[1] for parts in ends if len(parts) == 3)
 
 
@@ -64,8 +69,7 @@ def are_markers_current(store: Store, spec: JobSpec) -> bool:
     if store.head(keys.RECIPE_REPLACED) is not None:
         return False
     # Every job that ever ran here left its description.
-    jobs = [key for key in store.list("jobs/") if key.endswith("/job.json")]
-    rows = (json.loads(store.get(key)) for key in jobs)
+    rows = (json.loads(store.get(job_key(job))) for job in jobs_in(store))
     return all(r.get("version") == spec.version and not r.get("versions_before") for r in rows)
 
 

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from pathlib import Path
 from tempfile import TemporaryDirectory
@@ -59,6 +60,16 @@ def runner(config: FarmConfig, on_waiting: OnText) -> HouseRunner:
     return HouseRunner(patient, n_threads=max(1, (os.cpu_count() or 1) // config.slots))
 
 
+@dataclass(frozen=True, slots=True)
+class _Task:
+    """A task that runs."""
+
+    store: Store
+    request: TaskRequest
+    spec: JobSpec
+    on_step: OnText
+
+
 class HouseRunner:
     """Implements workers.runner.StepRunner: the steps of run/steps.py over the farm's store.
 
@@ -82,24 +93,25 @@ class HouseRunner:
         """
         spec = self._spec(request.job_id)
         with one_task(self._store, reads_whole=request.stage in (GL, LIGHT)) as store:
-            return self._run(store, request, spec, on_step)
+            return self._run(_Task(store, request, spec, on_step))
 
-    def _run(self, store: Store, request: TaskRequest, spec: JobSpec, on_step: OnText) -> Result:
+    def _run(self, task: _Task) -> Result:
+        request, spec, on_step = task.request, task.spec, task.on_step
         if request.stage == GEOMETRY:
-            return self._geometry(store, request, spec, on_step)
+            return self._geometry(task)
         if request.stage in (GL, LIGHT):
             # Light's inputs from the house: the first batch that needs them makes them.
             if request.stage == LIGHT:
                 for step in plan.needed_of_house("light", request.house):
-                    self._step(store, request, spec, on_step, step)
+                    self._step(task, step)
             for view in request.views:
                 for step in steps_of_stage(spec, request.stage):
-                    self._view_step(store, request, spec, on_step, step, view)
+                    self._view_step(task, step, view)
         elif request.stage == REDUCE:
             on_step("finish")
-            finish_house(store, request.house)
+            finish_house(task.store, request.house)
             if spec.reference:
-                self._pack_histograms(store, request.house, spec, on_step)
+                self._pack_histograms(task)
         elif request.stage == SHARD:
             merge_shard(self._store, spec, int(request.unit.removeprefix("s")), on_step)
         elif request.stage == JOB:
@@ -123,31 +135,30 @@ class HouseRunner:
         has_manifest = self._store.head(keys.house_key(house, keys.MANIFEST)) is not None
         return Survey(batches=batches, missing=units, reduced=finished and has_manifest)
 
-    def _geometry(
-        self, store: Store, request: TaskRequest, spec: JobSpec, on_step: OnText
-    ) -> Result:
+    def _geometry(self, task: _Task) -> Result:
+        spec, house = task.spec, task.request.house
         with TemporaryDirectory(prefix="pbrs-source-") as folder:
-            source = self._source(request.source, Path(folder))
+            source = self._source(task.request.source, Path(folder))
             is_dressed = uses_catalogue(source, spec.recipe)
             fill_cache(self._store, with_furniture=is_dressed or has_own_furniture(source))
-            sized = spec
+            sized = task
             if is_dressed:
                 # Look for the furniture before the house is read: another worker may have it.
                 recipe = local_catalogue(self._store, spec.recipe)
                 fetch_catalogue(recipe.dress)
-                sized = spec.model_copy(update={"recipe": recipe})
-            for step in steps_before_views(spec, request.house):
-                step_spec = sized if step == "house" else spec
-                self._step(store, request, step_spec, on_step, step, source=source)
-        return Result(batches=self._batches(spec, request.house))
+                sized = replace(task, spec=spec.model_copy(update={"recipe": recipe}))
+            for step in steps_before_views(spec, house):
+                self._step(sized if step == "house" else task, step, source=source)
+        return Result(batches=self._batches(spec, house))
 
-    def _pack_histograms(self, store: Store, house: str, spec: JobSpec, on_step: OnText) -> None:
+    def _pack_histograms(self, task: _Task) -> None:
         """The house's histograms in one object, so that the job's selection reads one a house."""
         from pbrs_farm.core.lighting import Mode
         from pbrs_farm.curate.selection_run import house_pack
 
-        on_step("histograms")
-        house_pack(store, house, Mode(spec.recipe.selection.score_mode))
+        task.on_step("histograms")
+        mode = Mode(task.spec.recipe.selection.score_mode)
+        house_pack(task.store, task.request.house, mode)
 
     def _select(self, spec: JobSpec, on_step: OnText) -> None:
         """Selection over the views there are; a run of the job's name, so that it adds up."""
@@ -180,50 +191,34 @@ class HouseRunner:
         placed = [(v, rooms[v]) for v in chosen]
         return batches_from_views(placed, spec.seconds_per_view, spec.min_batches)
 
-    def _view_step(
-        self,
-        store: Store,
-        request: TaskRequest,
-        spec: JobSpec,
-        on_step: OnText,
-        step: str,
-        view: str,
-    ) -> None:
+    def _view_step(self, task: _Task, step: str, view: str) -> None:
         """A step of a view; OpenGL's pictures, if others are wanted, are left out where it is missing."""
-        may_lack = step in plan.OPENGL_STEPS and plan.has_light(want_of(spec))
+        may_lack = step in plan.OPENGL_STEPS and plan.has_light(want_of(task.spec))
         if may_lack and self._lacks_opengl:
             return
         try:
-            self._step(store, request, spec, on_step, step, view=view)
+            self._step(task, step, view=view)
         except MachineFailed as error:
             if not may_lack:
                 raise
             self._lacks_opengl = str(error)
 
     def _step(
-        self,
-        store: Store,
-        request: TaskRequest,
-        spec: JobSpec,
-        on_step: OnText,
-        step: str,
-        *,
-        view: str | None = None,
-        source: SourceRef | None = None,
+        self, task: _Task, step: str, *, view: str | None = None, source: SourceRef | None = None
     ) -> None:
-        on_step(step if view is None else f"{step} {view}")
+        task.on_step(step if view is None else f"{step} {view}")
         limit_threads(step, self._n_threads)
         work = Work(
-            store=store,
-            recipe=spec.recipe,
-            house_id=request.house,
+            store=task.store,
+            recipe=task.spec.recipe,
+            house_id=task.request.house,
             house_cache=self._house_cache,
             source=source,
             view_id=view,
-            layers=spec.layers,
-            drops_radiance=spec.drop_radiance,
+            layers=task.spec.layers,
+            drops_radiance=task.spec.drop_radiance,
         )
-        run_step(step, work, attempt=request.attempt)
+        run_step(step, work, attempt=task.request.attempt)
 
     def _source(self, text: str, folder: Path) -> SourceRef:
         """The house's source; when it is kept in the store, on scratch under its own name."""

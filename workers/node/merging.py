@@ -15,14 +15,13 @@ from pbrs_farm.run.attributions import dressing_rows, write_attribution_of
 from pbrs_farm.store import Store
 from pbrs_farm.store.object_store import get_or_none
 from workers.ids import job_key, shard_key, task_from_failed_key
-from workers.job import JobSpec, houses_from_lines
+from workers.job import JobSpec, stored_houses
 from workers.runner import OnText
 
 
 def house_ids(store: Store, spec: JobSpec) -> list[str]:
     """The job's houses in the order, read from the store, that decides their shards."""
-    data = store.get(job_key(spec.job_id, "houses.jsonl"))
-    return [house.house_id for house in houses_from_lines(data)]
+    return [house.house_id for house in stored_houses(store, spec.job_id)]
 
 
 def merge_shard(store: Store, spec: JobSpec, shard: int, on_step: OnText) -> None:
