@@ -2,7 +2,7 @@
 
 The loaders are those of tests/export, written from each form's documentation; they share no code with the writers. A form is
 equal if no label differs in any pixel, depth is within the form's step, and K and poses are the view's. Questions are about
-pictures and walks of dressed homes that nobody tunes on; pbrs_farm/check/question_answers.py answers them again from the stored
+pictures and walks of dressed homes that nobody tunes on; pbrs_farm/check/question_checks.py answers them again from the stored
 files. A set of two homes must have the same bytes from one process, from two killed ones, and from two shards.
 """
 
@@ -24,7 +24,7 @@ from benchmarks.blind_pairs import blind_figures, render_edits
 from benchmarks.figures import write_report
 from benchmarks.stream_wait import UNITS as UNITS_OF_STREAM
 from benchmarks.stream_wait import stream_figures
-from pbrs_farm.check.question_answers import wrong_answers
+from pbrs_farm.check.question_checks import wrong_answers
 from pbrs_farm.curate.teaching_rules import REASONS, judged_by
 from pbrs_farm.export.export_views import finished_entries
 from tests.core.lenses.opencv_points import error_px

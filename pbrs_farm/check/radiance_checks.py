@@ -20,9 +20,9 @@ from pbrs_farm.check.checks import Check
 from pbrs_farm.check.colours import has_channels, linear_from_srgb, luminance_of, rgb_of
 from pbrs_farm.check.developing import tile_means
 from pbrs_farm.check.finishes import has_roughness
-from pbrs_farm.check.picture_checks import moved_copies
 from pbrs_farm.check.pixel_checks import albedo_of
 from pbrs_farm.check.stored_house import StoredHouse
+from pbrs_farm.check.view_checks import moved_copies
 from pbrs_farm.core.arrays import F64, Bools
 
 COAT = 0.04  # reflectance of a coat at normal incidence: glass of index 1.5

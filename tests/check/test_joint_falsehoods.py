@@ -16,8 +16,8 @@ from scipy.spatial.transform import Rotation
 
 from pbrs_farm.check.cases import HouseCase, ScenesInTime
 from pbrs_farm.check.certificate import Tally
+from pbrs_farm.check.house_checks import check_models
 from pbrs_farm.check.joint_checks import check_joints, row_of
-from pbrs_farm.check.solid_checks import check_models
 from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_mesh import Triangles, triangles_from_glb
 from pbrs_farm.core import classes

@@ -15,7 +15,7 @@ from pbrs_farm import check
 from pbrs_farm.check import verify
 from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.fields import FieldRow, fields_of, fields_of_set, row_and_names
-from pbrs_farm.check.question_answers import fault_of_phrase
+from pbrs_farm.check.question_checks import fault_of_phrase
 from pbrs_farm.check.stored_set import PACKED, stored_set
 from pbrs_farm.check.verify import check_form, check_set
 from pbrs_farm.cli import main

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import pbrs_farm as pf
-from pbrs_farm.check.question_answers import wrong_answers
+from pbrs_farm.check.question_checks import wrong_answers
 from pbrs_farm.core.edits import unedited_id
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import LightPart

@@ -13,7 +13,7 @@ import pyarrow.parquet as pq
 import pytest
 
 import pbrs_farm as pf
-from pbrs_farm.check.question_answers import wrong_answers
+from pbrs_farm.check.question_checks import wrong_answers
 from pbrs_farm.core.house import MaterialKind
 from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.export_views import export, remarks_of
