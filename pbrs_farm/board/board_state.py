@@ -13,7 +13,7 @@ from pbrs_farm.board.index.view_index import ViewIndex
 from pbrs_farm.board.live_farm import Audit, LiveFarm
 from pbrs_farm.board.options import BoardOptions
 from pbrs_farm.board.pages.rendering import environment
-from pbrs_farm.board.picture_cache import PictureCache
+from pbrs_farm.board.pictures import PictureCache
 from pbrs_farm.board.root_reader import RootReader
 from pbrs_farm.board.sessions import Sessions
 from pbrs_farm.board.static_files import Asset, assets

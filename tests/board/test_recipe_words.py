@@ -7,7 +7,7 @@ from pathlib import Path
 import httpx
 import pytest
 
-from pbrs_farm.board.pages.recipe_words import RecipeWords, recipe_words
+from pbrs_farm.board.pages.viewing import RecipeWords, recipe_words
 from pbrs_farm.board.root_reader import RootReader
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.formats.serialise import json_bytes

@@ -1,4 +1,4 @@
-"""A view's page and its files. Effects: reads the index and the store, makes pictures.
+"""A view's page and its files, with the root's recipe in words of the command line. Effects: reads the index and the store, makes pictures.
 
 Files are looked up by ids in the index and names in core/layers.py; no other part of an address
 becomes part of a path.
@@ -9,6 +9,7 @@ from __future__ import annotations
 import gzip
 import json
 from collections.abc import Callable
+from dataclasses import dataclass
 from typing import Any, Final
 
 import numpy as np
@@ -19,21 +20,22 @@ from starlette.responses import Response, StreamingResponse
 from pbrs_farm.board.index.house_rows import finite
 from pbrs_farm.board.index.queries import ListedView
 from pbrs_farm.board.pages.lists import asked_view, board_of
-from pbrs_farm.board.pages.recipe_words import recipe_words
 from pbrs_farm.board.pages.rendering import page
 from pbrs_farm.board.pages.words import OF_A_VIEW, listed
 from pbrs_farm.board.pictures import PLANES, packet, shown_png, thumbnail_jpeg
 from pbrs_farm.board.root_reader import MAX_PICTURE_BYTES, RootReader
 from pbrs_farm.core import keys
 from pbrs_farm.core.camera import Camera
-from pbrs_farm.core.errors import BadInput, PbrsError
+from pbrs_farm.core.errors import BadInput, BadRecipe, PbrsError
 from pbrs_farm.core.layers import LAYER, LAYERS
+from pbrs_farm.core.recipe import RECIPE_NAMES, differences, recipe_from_json, recipe_from_name
 from pbrs_farm.formats.layer_file import layer_from_bytes
 from pbrs_farm.gallery.label_colours import instance_colours
 from pbrs_farm.store.object_store import content_type
 
 FOREVER: Final = "private, max-age=31536000, immutable"  # for addresses with a version
 _STEPS: Final = ("truth", "opengl_dl", "opengl_il", "light", "develop", "view")
+_MOST_BYTES: Final = 2**20
 
 
 def view(request: Request) -> Response:
@@ -278,3 +280,34 @@ def _stored_file_rows(reader: RootReader, entry: ListedView) -> list[tuple[str, 
         if entry.has(x.name)
     )
     return [(name, file, n) for name, file, n in sizes if n is not None]
+
+
+@dataclass(frozen=True)
+class RecipeWords:
+    """Values of --recipe and --set: a preset and every different field, "light.spp=16"."""
+
+    preset: str
+    settings: tuple[str, ...]
+
+
+def recipe_words(reader: RootReader) -> RecipeWords | None:
+    """The root's recipe as a preset and settings; None without a recipe of this version.
+
+    The preset with the fewest different fields, and of several the one with the recipe's name.
+    """
+    data = reader.get_or_none(keys.RECIPE, _MOST_BYTES)
+    if data is None:
+        return None
+    try:
+        recipe = recipe_from_json(data, keys.RECIPE)
+    except BadRecipe:
+        return None
+    changes = {name: differences(recipe_from_name(name), recipe) for name in RECIPE_NAMES}
+    preset = min(changes, key=lambda name: (len(changes[name]), name != recipe.name))
+    return RecipeWords(preset, tuple(_setting(line) for line in changes[preset]))
+
+
+def _setting(difference: str) -> str:
+    """ "light.spp: 64 -> 16" as "light.spp=16"."""
+    path, _, values = difference.partition(": ")
+    return f"{path}={values.rpartition(' -> ')[2]}"
