@@ -12,44 +12,11 @@ from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import Rgb, shade
 from pbrs_farm.dress.thing_materials import glass, plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
+from pbrs_farm.furnishings.things.profiles import profiles
 from pbrs_farm.geometry.bodies import sphere, stretched
 from pbrs_farm.geometry.outlines import bent, fluted, oval, rect, rings, scaled
 
 # fmt: off
-_Shape = tuple[tuple[float, float], ...]
-
-# Of each body: half its width and its height in metres, its outside up to the mouth in shares of these,
-# and between which heights its side is straight enough for a label.
-_BODIES: Final[dict[str, tuple[float, float, _Shape, tuple[float, float]]]] = {"claret": (0.037,
-    0.3, ((0.95, 0.0), (1.0, 0.015), (1.0, 0.6), (0.92, 0.66), (0.42, 0.74), (0.36, 0.98)),
-    (0.12, 0.55)), "burgundy": (0.041, 0.29, ((0.95, 0.0), (1.0, 0.02), (1.0, 0.4), (0.88, 0.52),
-    (0.6, 0.66), (0.36, 0.78), (0.34, 0.97)), (0.08, 0.38)),
-    "hock": (0.037, 0.34, ((0.95, 0.0), (1.0, 0.02), (1.0, 0.35), (0.72, 0.58), (0.44, 0.76),
-    (0.36, 0.97)), (0.08, 0.33)), "champagne": (0.044, 0.31,
-    ((0.9, 0.0), (1.0, 0.03), (1.0, 0.42), (0.8, 0.58), (0.45, 0.74), (0.33, 0.86), (0.36, 0.87),
-    (0.34, 0.97)), (0.1, 0.38)), "long neck": (0.031, 0.23,
-    ((0.96, 0.0), (1.0, 0.02), (1.0, 0.5), (0.85, 0.6), (0.48, 0.74), (0.42, 0.94)), (0.14, 0.46)),
-    "steinie": (0.033, 0.18, ((0.95, 0.0), (1.0, 0.02), (1.0, 0.55), (0.88, 0.66), (0.5, 0.78),
-    (0.42, 0.95)), (0.12, 0.5)), "cola": (0.03, 0.2, ((0.92, 0.0), (1.0, 0.08), (0.86, 0.2),
-    (0.98, 0.38), (1.0, 0.48), (0.78, 0.64), (0.44, 0.8), (0.4, 0.95)), (0.34, 0.5)),
-    "milk": (0.04, 0.22, ((0.95, 0.0), (1.0, 0.02), (1.0, 0.58), (0.9, 0.66), (0.62, 0.8),
-    (0.6, 0.93), (0.68, 0.94), (0.68, 1.0)), (0.15, 0.5)),
-    "oil": (0.028, 0.28, ((0.96, 0.0), (1.0, 0.015), (1.0, 0.7), (0.94, 0.74), (0.46, 0.8),
-    (0.42, 0.97)), (0.2, 0.6)), "decanter": (0.062, 0.23, ((0.75, 0.0), (1.0, 0.08), (1.0, 0.2),
-    (0.6, 0.42), (0.28, 0.56), (0.22, 0.8), (0.3, 0.96)), (0.06, 0.2)),
-    "onion": (0.05, 0.2, ((0.6, 0.0), (0.95, 0.15), (1.0, 0.28), (0.85, 0.45), (0.4, 0.6),
-    (0.26, 0.72), (0.25, 0.95)), (0.2, 0.34)), "whisky": (0.043, 0.24,
-    ((0.97, 0.0), (1.0, 0.02), (1.0, 0.62), (0.96, 0.68), (0.5, 0.74), (0.36, 0.76), (0.35, 0.95)),
-    (0.1, 0.56)), "gin": (0.042, 0.2, ((0.95, 0.0), (1.0, 0.03), (1.0, 0.7), (0.9, 0.76),
-    (0.34, 0.8), (0.34, 0.95)), (0.12, 0.64)), "bell": (0.052, 0.22,
-    ((1.0, 0.0), (1.0, 0.06), (0.86, 0.35), (0.5, 0.6), (0.28, 0.72), (0.26, 0.95)), (0.06, 0.2)),
-    "liqueur": (0.036, 0.25, ((0.8, 0.0), (0.84, 0.03), (1.0, 0.5), (0.9, 0.6), (0.4, 0.68),
-    (0.34, 0.95)), (0.2, 0.45)), "soda": (0.035, 0.27, ((0.92, 0.0), (1.0, 0.03), (1.0, 0.22),
-    (0.94, 0.24), (0.94, 0.3), (1.0, 0.32), (1.0, 0.55), (0.5, 0.82), (0.38, 0.84), (0.38, 0.94)),
-    (0.34, 0.54)), "flask": (0.04, 0.2, ((0.95, 0.0), (1.0, 0.05), (1.0, 0.5), (0.85, 0.68),
-    (0.45, 0.8), (0.45, 0.97)), (0.1, 0.48)), "carboy": (0.055, 0.25,
-    ((0.92, 0.0), (1.0, 0.04), (1.0, 0.45), (0.9, 0.6), (0.55, 0.72), (0.3, 0.78), (0.3, 0.96)),
-    (0.12, 0.44))}
 _LIQUIDS: Final = ((0.35, 0.05, 0.08), (0.75, 0.6, 0.15), (0.4, 0.2, 0.05), (0.8, 0.82, 0.8),
     (0.5, 0.45, 0.12), (0.75, 0.3, 0.2))
 
@@ -118,16 +85,15 @@ def bottle(m: Maker) -> None:
 
 def _composed(m: Maker) -> None:
     """A turned or facetted bottle: one of the bodies, a closure, labels or none."""
-    name = m.pick(*_BODIES)
-    half, high, shape, straight = _BODIES[name]
-    r, tall = half * m.uniform(0.93, 1.07), high * m.uniform(0.92, 1.08)
-    profile = [(x * r, y * tall) for x, y in shape]
+    body = m.pick(*profiles("bottle").values())
+    r, tall = body.radius_m * m.uniform(0.93, 1.07), body.height_m * m.uniform(0.92, 1.08)
+    profile = scaled(r, tall, body.profile)
     tint = m.pick((0.1, 0.2, 0.08), (0.3, 0.16, 0.06), (0.8, 0.85, 0.85), (0.25, 0.3, 0.1),
         (0.16, 0.22, 0.34))
     n = m.pick(18, 18, 20)
     is_clear = m.chance(0.35)
     side = glass(tint, 0.3) if is_clear else plain("bottle", tint, 0.08)
-    facets = (m.pick(4, 6, 8) if name in ("oil", "gin", "whisky", "decanter",
+    facets = (m.pick(4, 6, 8) if body.name in ("oil", "gin", "whisky", "decanter",
         "flask") and m.chance(0.45) else 0)
     if facets:
         m.loft([(oval(2 * x, 2 * x, n=facets), y) for x, y in profile], sharp=25.0, of=side)
@@ -135,7 +101,7 @@ def _composed(m: Maker) -> None:
         m.revolve([(0.0, 0.0), *profile, (0.0, profile[-1][1])], n=n, of=side)
     if is_clear:
         # The liquid ends at the shoulder or below.
-        level = m.uniform(0.5, 1.0) * straight[1] * tall
+        level = m.uniform(0.5, 1.0) * body.label_to * tall
         inner = 0.68 if facets else 0.93
         inside = [(inner * x, max(y, 0.004)) for x, y in profile if y < level]
         last = float(np.interp(level, [y for _, y in profile], [x for x, _ in profile]))
@@ -143,7 +109,7 @@ def _composed(m: Maker) -> None:
             of=plain("liquid", m.pick(*_LIQUIDS), 0.1))
     _close(m, profile[-1][0], profile[-1][1], tall)
     if not facets:
-        _label(m, profile, (straight[0] * tall, straight[1] * tall), n)
+        _label(m, profile, (body.label_from * tall, body.label_to * tall), n)
 
 
 def _close(m: Maker, mouth: float, top: float, tall: float) -> None:

@@ -11,44 +11,15 @@ from pbrs_farm.dress import thing_materials as materials
 from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.furnishings.things.cups import handle
 from pbrs_farm.furnishings.things.maker import Maker, thing
+from pbrs_farm.furnishings.things.profiles import profiles
 from pbrs_farm.geometry.bodies import bevelled, vessel
-from pbrs_farm.geometry.outlines import bent, fluted, oval, rings
+from pbrs_farm.geometry.outlines import Profile, bent, fluted, oval, rings
 
 # fmt: off
-_Shape = tuple[tuple[float, float], ...]
-
-# Of each bowl: half its width and its height in metres, and its outside from the foot to the rim in
-# shares of these. The first table is for bowls on a stem, the second for glasses without one.
-_ON_STEMS: Final[dict[str, tuple[float, float, _Shape]]] = {"red wine": (0.045, 0.11,
-    ((0.35, 0.04), (0.8, 0.22), (1.0, 0.45), (0.95, 0.7), (0.75, 1.0))),
-    "white wine": (0.036, 0.1, ((0.4, 0.05), (0.95, 0.32), (1.0, 0.5), (0.85, 1.0))),
-    "balloon": (0.05, 0.1, ((0.4, 0.03), (0.85, 0.2), (1.0, 0.42), (0.9, 0.7), (0.65, 0.95),
-    (0.64, 1.0))), "flute": (0.025, 0.16, ((0.25, 0.03), (0.7, 0.2), (1.0, 0.6), (0.92, 1.0))),
-    "tulip": (0.031, 0.13, ((0.3, 0.04), (0.9, 0.28), (1.0, 0.45), (0.8, 0.75), (0.95, 1.0))),
-    "coupe": (0.05, 0.05, ((0.3, 0.1), (0.75, 0.35), (0.95, 0.65), (1.0, 1.0))),
-    "cocktail": (0.052, 0.06, ((0.1, 0.02), (1.0, 1.0))), "hurricane": (0.036, 0.14,
-    ((0.6, 0.05), (0.95, 0.25), (0.7, 0.6), (0.72, 0.7), (1.0, 1.0))),
-    "goblet": (0.04, 0.09, ((0.5, 0.03), (0.92, 0.25), (1.0, 0.6), (1.0, 1.0))),
-    "sherry": (0.027, 0.07, ((0.35, 0.06), (0.95, 0.45), (0.8, 1.0))),
-    "snifter": (0.045, 0.085, ((0.5, 0.03), (0.95, 0.25), (1.0, 0.4), (0.55, 1.0))),
-    "sundae": (0.04, 0.12, ((0.3, 0.02), (0.45, 0.2), (0.75, 0.55), (0.8, 0.75), (1.0, 1.0)))}
-_TUMBLERS: Final[dict[str, tuple[float, float, _Shape]]] = {"straight": (0.035, 0.1,
-    ((0.97, 0.0), (1.0, 0.03), (1.0, 1.0))), "tapered": (0.038, 0.12, ((0.72, 0.0), (1.0, 1.0))),
-    "old fashioned": (0.042, 0.085, ((0.9, 0.0), (0.96, 0.05), (1.0, 1.0))),
-    "barrel": (0.038, 0.1, ((0.8, 0.0), (0.97, 0.25), (1.0, 0.5), (0.92, 0.85), (0.9, 1.0))),
-    "highball": (0.031, 0.15, ((0.95, 0.0), (1.0, 0.02), (0.98, 0.5), (1.0, 1.0))),
-    "pint": (0.043, 0.15, ((0.7, 0.0), (0.92, 0.7), (1.0, 0.76), (1.0, 0.84), (0.96, 0.87),
-    (0.99, 1.0))), "wheat beer": (0.04, 0.2, ((0.85, 0.0), (0.9, 0.06), (0.66, 0.25), (0.8, 0.5),
-    (1.0, 0.8), (0.94, 1.0))), "waisted": (0.036, 0.14, ((0.88, 0.0), (0.9, 0.2), (0.78, 0.42),
-    (1.0, 1.0))), "round": (0.042, 0.08, ((0.55, 0.0), (0.9, 0.18), (1.0, 0.45), (0.95, 0.75),
-    (0.8, 1.0))), "shot": (0.023, 0.06, ((0.75, 0.0), (0.8, 0.12), (1.0, 1.0))),
-    "ringed": (0.036, 0.11, tuple((1.0 if k % 2 else 0.95, k / 11) for k in range(12))),
-    "two steps": (0.038, 0.13, ((0.66, 0.0), (0.68, 0.3), (0.82, 0.34), (0.84, 0.64), (0.98, 0.68),
-    (1.0, 1.0)))}
 _WALL_M: Final = 0.002
 
 
-def _filled(m: Maker, r: float, low: float, tall: float, shape: _Shape, share: float) -> None:
+def _filled(m: Maker, r: float, low: float, tall: float, shape: Profile, share: float) -> None:
     """A drink in a bowl, up to a share of its height."""
     radii, heights = np.array([(0.0, 0.0), *shape]).T
     ys = np.linspace(0.06, share, 5)
@@ -62,8 +33,9 @@ def _filled(m: Maker, r: float, low: float, tall: float, shape: _Shape, share: f
 
 def _stemmed(m: Maker) -> None:
     """A bowl on a stem and a foot."""
-    half, tall, shape = _ON_STEMS[m.pick(*_ON_STEMS)]
-    r, tall, stem = (half * m.uniform(0.92, 1.08), tall * m.uniform(0.92, 1.1),
+    bowl = m.pick(*profiles("stemmed").values())
+    shape = bowl.profile
+    r, tall, stem = (bowl.radius_m * m.uniform(0.92, 1.08), bowl.height_m * m.uniform(0.92, 1.1),
         m.uniform(0.035, 0.09))
     foot = max(0.8 * r, 0.028)
     way = m.integers(0, 4)
@@ -95,9 +67,9 @@ def _stemmed(m: Maker) -> None:
 
 def _tumbler(m: Maker) -> None:
     """A glass without a stem, one or a few."""
-    name = m.pick(*_TUMBLERS)
-    half, tall, shape = _TUMBLERS[name]
-    r, tall = half * m.uniform(0.92, 1.08), tall * m.uniform(0.92, 1.1)
+    form = m.pick(*profiles("tumbler").values())
+    shape = form.profile
+    r, tall = form.radius_m * m.uniform(0.92, 1.08), form.height_m * m.uniform(0.92, 1.1)
     base = m.pick(1.0, 1.0, 5.0)
     outer = [(0.0, 0.0), *((x * r, y * tall) for x, y in shape)]
     n = 1 if m.chance(0.75) else m.integers(2, 5)

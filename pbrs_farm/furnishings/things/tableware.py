@@ -9,8 +9,9 @@ from pbrs_farm.core.classes import PAPER
 from pbrs_farm.core.frames import rotation_x, rotation_y, rotation_z
 from pbrs_farm.dress.thing_materials import STEEL, plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
+from pbrs_farm.furnishings.things.profiles import profiles
 from pbrs_farm.geometry.bodies import bevelled
-from pbrs_farm.geometry.outlines import Outline, fluted, oval, rect, rings
+from pbrs_farm.geometry.outlines import Outline, fluted, oval, rect, rings, scaled
 
 
 # fmt: off
@@ -28,26 +29,14 @@ def one_plate(m: Maker) -> None:
     pile(m, 1)
 
 
-# Profiles of round plates, (share of the radius, metres), from the foot round the rim to the inside.
-_ROUND = (
-    [(0.6, 0), (0.72, 0.006), (1, 0.02), (0.985, 0.0225), (0.7, 0.0095), (0.6, 0.005)],
-    [(0.55, 0), (1, 0.026), (0.985, 0.028), (0.55, 0.005)],
-    [(0.45, 0), (0.47, 0.003), (0.75, 0.006), (0.93, 0.015), (1, 0.024), (0.985, 0.0255),
-        (0.9, 0.0175), (0.6, 0.009), (0.3, 0.006)],
-    [(0.9, 0), (0.97, 0.003), (1, 0.02), (0.985, 0.021), (0.95, 0.007), (0.9, 0.0055)],
-    [(0.5, 0), (0.53, 0), (0.56, 0.006), (0.8, 0.01), (1, 0.018), (0.985, 0.02), (0.78, 0.0125),
-        (0.5, 0.0085)],
-    [(0.6, 0), (0.72, 0.006), (1, 0.02), (0.985, 0.0225), (0.95, 0.0205), (0.93, 0.0215),
-        (0.9, 0.019), (0.87, 0.02), (0.84, 0.0165), (0.7, 0.0095), (0.6, 0.005)],
-    [(0.5, 0), (0.6, 0.026), (0.95, 0.034), (0.935, 0.036), (0.58, 0.03), (0.47, 0.005)],
-)
-_DEEP = 6  # of these: no others lie on it
+_DEEP = 6  # of the round plates: no others lie on it
 
 
 def pile(m: Maker, n: int) -> None:
     """Plates of one form on top of each other."""
     r, glaze, form = m.uniform(0.1, 0.14), m.china(), m.integers(0, 13)
     form = 0 if form == _DEEP and n > 1 else form
+    round_plates = [plate.profile for plate in profiles("plate").values()]
     sides = 24 if n == 1 else 16 if n < 4 else 10
     # They nest 6.6 mm apart.
     for k in range(n):
@@ -67,9 +56,9 @@ def pile(m: Maker, n: int) -> None:
                     ribs = 16 if n == 1 else 8
                     plate_of(m, fluted, (1.3 * r, ribs, 0.02), (2 * r, ribs, 0.045))
                 case _:
-                    m.turned([(x * r, y) for x, y in _ROUND[form]], n=sides)
+                    m.turned(scaled(r, 1.0, round_plates[form]), n=sides)
     if form in (0, 2, 3, 4) and m.chance(0.35):
-        top = 0.0066 * (n - 1) + max(y for _x, y in _ROUND[form])
+        top = 0.0066 * (n - 1) + max(y for _x, y in round_plates[form])
         m.hoop(oval(1.975 * r, 1.975 * r, n=28), top - 0.001, 0.0012, n=5,
             of=m.coloured("china band", 0.2))
     # Some have a spoon, a fork or crumbs on them.
