@@ -82,14 +82,21 @@ def d_shape(
 
 
 def rings(
-    outline: Callable[..., Outline], rows: Sequence[tuple[float, ...]], **alike: float
+    outline: Callable[..., Outline],
+    rows: Sequence[tuple[float, ...]],
+    *,
+    column: str = "",
+    **alike: float,
 ) -> list[tuple[Outline, float]]:
     """Outlines at heights, as `loft` takes them, all of one form.
 
-    rows: what each outline takes, and its height last; alike: what all take.
+    rows: what each outline takes, and its height last; alike: what all take. column: the keyword
+    for the number before the height, where it differs from row to row.
 
         loft(rings(oval, [(0.2, 0.1, 0.0), (0.3, 0.2, 0.5)], n=20))  # ovals at 0 and 0.5 m
     """
+    if column:
+        return [(outline(*row[:-2], **{column: row[-2]}, **alike), row[-1]) for row in rows]
     return [(outline(*row[:-1], **alike), row[-1]) for row in rows]
 
 

@@ -85,10 +85,10 @@ def toilet(m: Maker, size: Size) -> None:
         case 0:  # a cistern on the bowl
             r = m.pick(0.02, 0.04, 0.07)
             m.rounded(w, (rim - 0.02, h - 0.035), tank, r, against=back, of=CERAMIC)
-            m.loft([(rect(w - 0.005, tank + 0.005, r, z=back + tank / 2), h - 0.045),
-                (rect(w, tank + 0.008, r, z=back + tank / 2 + 0.001), h - 0.03),
-                (rect(w, tank + 0.008, r, z=back + tank / 2 + 0.001), h - 0.012),
-                (rect(w - 0.03, tank - 0.02, r, z=back + tank / 2), h - 0.002)], of=CERAMIC)
+            m.loft(rings(rect, [(w - 0.005, tank + 0.005, r, back + tank / 2, h - 0.045), (w,
+                tank + 0.008, r, back + tank / 2 + 0.001, h - 0.03), (w, tank + 0.008, r,
+                back + tank / 2 + 0.001, h - 0.012), (w - 0.03, tank - 0.02, r, back + tank / 2,
+                h - 0.002)], column="z"), of=CERAMIC)
             if m.chance(0.75):
                 m.frustum((0.022, h - 0.003), (0.02, h), at=(0.0, 0.0, back + tank / 2), of=button)
             else:
@@ -154,21 +154,17 @@ def basin_bowl(m: Maker, form: int, w: float, d: float, back: float, y: float, d
     z = back + d / 2
     match form:
         case 0:  # a rectangle
-            m.loft([(rect(w * 0.8, d * 0.8, 0.05, z=z), y - deep),
-                (rect(w * 0.97, d * 0.97, 0.04, z=z), y - 0.3 * deep),
-                (rect(w, d, 0.02, z=z), y - 0.02), (rect(w, d, 0.02, z=z), y - 0.004),
-                (rect(w - 0.01, d - 0.01, 0.02, z=z), y), (rect(w - 0.08, d - 0.15, 0.04,
-                z=z + 0.035), y - 0.002), (rect(w - 0.12, d - 0.19, 0.05, z=z + 0.035),
-                y - 0.7 * deep), (rect(w * 0.4, d * 0.3, 0.05, z=z + 0.03), y - 0.82 * deep)],
-                of=CERAMIC)
+            m.loft(rings(rect, [(w * 0.8, d * 0.8, 0.05, z, y - deep), (w * 0.97, d * 0.97, 0.04, z,
+                y - 0.3 * deep), (w, d, 0.02, z, y - 0.02), (w, d, 0.02, z, y - 0.004), (w - 0.01,
+                d - 0.01, 0.02, z, y), (w - 0.08, d - 0.15, 0.04, z + 0.035, y - 0.002), (w - 0.12,
+                d - 0.19, 0.05, z + 0.035, y - 0.7 * deep), (w * 0.4, d * 0.3, 0.05, z + 0.03,
+                y - 0.82 * deep)], column="z"), of=CERAMIC)
         case 1:  # straight at the back, round in front
-            m.loft([(d_shape(w * 0.6, d * 0.6, back=back), y - deep),
-                (d_shape(w * 0.92, d * 0.94, back=back), y - 0.4 * deep),
-                (d_shape(w, d, back=back), y - 0.03), (d_shape(w, d, back=back), y - 0.005),
-                (d_shape(w - 0.012, d - 0.006, back=back), y), (d_shape(w - 0.09, d - 0.15,
-                back=back + 0.11), y - 0.003), (d_shape(w - 0.14, d - 0.19, back=back + 0.12),
-                y - 0.6 * deep), (d_shape(w * 0.4, d * 0.3, back=back + 0.18), y - 0.8 * deep)],
-                of=CERAMIC)
+            m.loft(rings(d_shape, [(w * 0.6, d * 0.6, back, y - deep), (w * 0.92, d * 0.94, back,
+                y - 0.4 * deep), (w, d, back, y - 0.03), (w, d, back, y - 0.005), (w - 0.012,
+                d - 0.006, back, y), (w - 0.09, d - 0.15, back + 0.11, y - 0.003), (w - 0.14,
+                d - 0.19, back + 0.12, y - 0.6 * deep), (w * 0.4, d * 0.3, back + 0.18,
+                y - 0.8 * deep)], column="back"), of=CERAMIC)
         case 2:  # an oval
             m.loft(rings(oval, [(w * 0.55, d * 0.55, y - deep),
                 (w * 0.95, d * 0.95, y - 0.35 * deep), (w, d, y - 0.012), (w - 0.008, d - 0.008, y),
@@ -302,12 +298,10 @@ def bathtub(m: Maker, size: Size) -> None:
             with m.of(colour):
                 bath_hollow(m, w, d, h, p)
         case 1:  # free: a shell that swells
-            m.loft([(oval(w * 0.72, d * 0.6, n=36, power=p), 0.0),
-                (oval(w * 0.84, d * 0.8, n=36, power=p), 0.12), (oval(w * 0.96, d * 0.96, n=36,
-                power=p), h - 0.08), (oval(w, d, n=36, power=p), h - 0.012),
-                (oval(w - 0.012, d - 0.012, n=36, power=p), h), (oval(w - 0.06, d - 0.06, n=36,
-                power=p), h - 0.006), (oval(w * 0.84, d * 0.8, n=36, power=p), 0.26),
-                (oval(w * 0.6, d * 0.5, n=36, power=3.0), 0.15)], of=colour)
+            m.loft(rings(oval, [(w * 0.72, d * 0.6, p, 0.0), (w * 0.84, d * 0.8, p, 0.12),
+                (w * 0.96, d * 0.96, p, h - 0.08), (w, d, p, h - 0.012), (w - 0.012, d - 0.012, p,
+                h), (w - 0.06, d - 0.06, p, h - 0.006), (w * 0.84, d * 0.8, p, 0.26), (w * 0.6,
+                d * 0.5, 3.0, 0.15)], column="power", n=36), of=colour)
         case 2:  # on feet
             m.loft(rings(oval, [(w * 0.6, d * 0.5, 0.12), (w * 0.84, d * 0.8, 0.2),
                 (w * 0.95, d * 0.94, h - 0.1), (w * 0.96, d * 0.95, h - 0.03), (w, d, h - 0.015),
@@ -331,12 +325,10 @@ def bathtub(m: Maker, size: Size) -> None:
 
 def bath_hollow(m: Maker, w: float, d: float, h: float, p: float) -> None:
     """The rim and hollow of a bath of w by d: rectangles outside, an oval of that power inside."""
-    m.loft([(oval(w - 0.1, d - 0.1, n=36, power=6.0), 0.1),
-        (oval(w - 0.03, d - 0.03, n=36, power=14.0), h - 0.05),
-        (oval(w, d, n=36, power=40.0), h - 0.04), (oval(w, d, n=36, power=40.0), h - 0.004),
-        (oval(w - 0.006, d - 0.006, n=36, power=40.0), h), (oval(w - 0.15, d - 0.14, n=36, power=p),
-        h - 0.002), (oval(w - 0.24, d - 0.2, n=36, power=p), h - 0.25),
-        (oval(w - 0.5, d - 0.34, n=36, power=3.0), h - 0.405)])
+    m.loft(rings(oval, [(w - 0.1, d - 0.1, 6.0, 0.1), (w - 0.03, d - 0.03, 14.0, h - 0.05), (w, d,
+        40.0, h - 0.04), (w, d, 40.0, h - 0.004), (w - 0.006, d - 0.006, 40.0, h), (w - 0.15,
+        d - 0.14, p, h - 0.002), (w - 0.24, d - 0.2, p, h - 0.25), (w - 0.5, d - 0.34, 3.0,
+        h - 0.405)], column="power", n=36))
 
 
 @family(group="shower", nyu40=OTHERSTRUCTURE, place=Place.FLOOR, variants=28,

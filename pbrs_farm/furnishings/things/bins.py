@@ -137,10 +137,9 @@ def half_round_bin(m: Maker, r: float, tall: float, material: Material) -> None:
     """A half round bin for a place at the wall."""
     m.loft([(d_shape(1.9 * r, 1.4 * r, back=-0.7 * r), 0.0),
         (d_shape(2 * r, 1.5 * r, back=-0.75 * r), tall * 1.2)], of=material)
-    m.loft([(d_shape(2.02 * r, 1.52 * r, back=-0.76 * r), tall * 1.2 + 0.0002),
-        (d_shape(2.02 * r, 1.52 * r, back=-0.76 * r), tall * 1.26),
-        (d_shape(1.7 * r, 1.2 * r, back=-0.6 * r), tall * 1.36)],
-        of=plain("lid", (0.12, 0.12, 0.12), 0.45))
+    m.loft(rings(d_shape, [(2.02 * r, 1.52 * r, -0.76 * r, tall * 1.2 + 0.0002), (2.02 * r,
+        1.52 * r, -0.76 * r, tall * 1.26), (1.7 * r, 1.2 * r, -0.6 * r, tall * 1.36)],
+        column="back"), of=plain("lid", (0.12, 0.12, 0.12), 0.45))
 
 
 def bag_bin(m: Maker, r: float, tall: float) -> None:

@@ -51,19 +51,17 @@ def shoes(m: Maker) -> None:
                     m.add(raised_heel(stretched(dome, (wide * 0.97, 0.08 * q, long))), at=(0, y, 0),
                         of=upper)
                     h = 0.15 if form == 1 else 0.32
-                    m.loft([(oval(0.075, 0.1, z=-0.07), 0.03), (oval(0.078, 0.1, z=-0.075),
-                        0.5 * h), (oval(0.095, 0.12, z=-0.075), h),
-                        (oval(0.085, 0.11, z=-0.075), h), (oval(0.07, 0.09, z=-0.075), 0.55 * h)],
-                        of=upper)
+                    m.loft(rings(oval, [(0.075, 0.1, -0.07, 0.03), (0.078, 0.1, -0.075, 0.5 * h),
+                        (0.095, 0.12, -0.075, h), (0.085, 0.11, -0.075, h), (0.07, 0.09, -0.075,
+                        0.55 * h)], column="z"), of=upper)
                 case 3:  # slippers
                     m.add(stretched(dome, (wide * 0.98, 0.06 * q, 0.16 * q)), at=(0, y, 0.05 * q),
                         of=upper)
                     m.bulged((wide * 0.9, 0.014, long * 0.9), n=5, edge=0.6, bulge=4.0,
                         at=(0, y + 0.004, 0), of=plain("lining", (0.85, 0.82, 0.76), 0.98))
                 case 5:  # heels
-                    m.loft([(oval(0.07, 0.13, z=0.06), 0.0), (oval(0.075, 0.13, z=0.06), 0.012),
-                        (oval(0.06, 0.11, z=0.05), 0.035), (oval(0.03, 0.06, z=0.04), 0.04)],
-                        of=upper)
+                    m.loft(rings(oval, [(0.07, 0.13, 0.06, 0.0), (0.075, 0.13, 0.06, 0.012), (0.06,
+                        0.11, 0.05, 0.035), (0.03, 0.06, 0.04, 0.04)], column="z"), of=upper)
                     m.tube([(0, 0.02, 0.02), (0, 0.075, -0.085)], 0.022, of=upper)
                     m.tube([(0, 0, -0.1), (0, 0.085, -0.095)], 0.006, n=7, end=0.02, of=upper)
                     m.loft(rings(oval, [(0.05, 0.06, 0.07), (0.055, 0.065, 0.12),

@@ -547,9 +547,8 @@ def hood(m: Maker, size: Size) -> None:
                 m.box(w, 0.045, d, 0.002)
                 m.loft([(rect(w, d, 0.004), 0.044), (rect(c + 0.01, cd + 0.01, 0.004, z=cz), 0.26)])
             case 2:  # a dome
-                m.loft([(d_shape(w, d, back=-hd, share=0.5), 0.0),
-                    (d_shape(w, d, back=-hd, share=0.5), 0.02), (d_shape(w * 0.9, d * 0.9, back=-hd,
-                    share=0.5), 0.09), (d_shape(c + 0.02, cd + 0.02, back=-hd, share=0.3), 0.2)])
+                m.loft(rings(d_shape, [(w, d, 0.5, 0.0), (w, d, 0.5, 0.02), (w * 0.9, d * 0.9, 0.5,
+                    0.09), (c + 0.02, cd + 0.02, 0.3, 0.2)], column="share", back=-hd))
             case 3:  # a glass plate
                 m.box(c + 0.1, (0.03, 0.09), (-hd, -hd + cd + 0.08), 0.003)
                 m.board(w, d, 0.02, 0.03, 0.05, 0.002, of=glass((0.8, 0.9, 0.9), 0.3))

@@ -455,10 +455,9 @@ def sconce(m: Maker, size: Size) -> None:
             for y in (0.0, h - 0.0115):
                 m.box(w - 0.04, 0.0115, (0.02, d - 0.02), on=y, of=OPAL)
         case 3:  # a half bowl
-            m.loft([(d_shape(w * 0.3, d * 0.4, back=0.0), 0.0),
-                (d_shape(w * 0.8, d * 0.8, back=0.0), 0.4 * h), (d_shape(w, d, back=0.0), h),
-                (d_shape(w - 0.01, d - 0.006, back=0.003), h), (d_shape(w * 0.7, d * 0.7,
-                back=0.006), 0.45 * h)], of=material)
+            m.loft(rings(d_shape, [(w * 0.3, d * 0.4, 0.0, 0.0), (w * 0.8, d * 0.8, 0.0, 0.4 * h),
+                (w, d, 0.0, h), (w - 0.01, d - 0.006, 0.003, h), (w * 0.7, d * 0.7, 0.006,
+                0.45 * h)], column="back"), of=material)
             m.sphere((0.0, 0.7 * h, d * 0.42), 0.025, n=10, of=OPAL)
         case 4:  # a lit panel
             m.box(w, h, (0.0, 0.03), 0.004, of=material)

@@ -290,10 +290,9 @@ def armchair(m: Maker, size: Size) -> None:
             with m.of(material):
                 m.rounded(w - 0.04, (low, seat - 0.1), (-hd + 0.04, hd - 0.01), 0.03, n=1)
                 m.rounded(w - 0.24, (seat - 0.11, seat), (-hd + 0.16, hd), 0.05)
-                m.loft([(rect(w - 0.1, 0.2, 0.06, z=-hd + 0.12), low),
-                    (rect(w - 0.1, 0.17, 0.06, z=-hd + 0.09), h * 0.7),
-                    (rect(w - 0.12, 0.14, 0.06, z=-hd + 0.07), h - 0.03),
-                    (rect(w - 0.18, 0.08, 0.03, z=-hd + 0.07), h)])
+                m.loft(rings(rect, [(w - 0.1, 0.2, 0.06, -hd + 0.12, low), (w - 0.1, 0.17, 0.06,
+                    -hd + 0.09, h * 0.7), (w - 0.12, 0.14, 0.06, -hd + 0.07, h - 0.03), (w - 0.18,
+                    0.08, 0.03, -hd + 0.07, h)], column="z"))
                 for s in (-1.0, 1.0):
                     m.rounded(on_side(s, hw - 0.12, hw), (low, seat + 0.2), (-hd + 0.05, hd - 0.03),
                         0.05)
