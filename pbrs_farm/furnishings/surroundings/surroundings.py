@@ -176,7 +176,7 @@ def _level_of_ground(
 def _sides(footprint: BaseGeometry, ground_y: float) -> list[_Side]:
     x0, z0, x1, z1 = footprint.bounds
     cx, cz, hx, hz = (x0 + x1) / 2, (z0 + z1) / 2, (x1 - x0) / 2, (z1 - z0) / 2
-    sides = []
+    sides: list[_Side] = []
     for ox, oz, half in ((0, 1, hx), (1, 0, hz), (0, -1, hx), (-1, 0, hz)):
         out = np.array([ox, 0.0, oz])
         middle = np.array([cx + ox * hx, ground_y, cz + oz * hz])

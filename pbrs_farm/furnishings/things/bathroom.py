@@ -7,8 +7,6 @@ from typing import Final
 
 from numpy import pi
 
-from pbrs_farm.core.catalogue import Place
-from pbrs_farm.core.classes import BATHTUB, OTHERSTRUCTURE, SINK, TOILET
 from pbrs_farm.core.frames import rotation_x, rotation_y
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import mix
@@ -25,18 +23,17 @@ from pbrs_farm.dress.thing_materials import (
     glossy,
     plain,
 )
+from pbrs_farm.furnishings.things.catalogued import catalogued
 from pbrs_farm.furnishings.things.cloth import hanging
 from pbrs_farm.furnishings.things.joints import Inside, Look, fronts_of, hollow
-from pbrs_farm.furnishings.things.maker import Maker, Size, family
+from pbrs_farm.furnishings.things.maker import Maker, Size
 from pbrs_farm.geometry.outlines import bent, d_shape, oval, rect, rings
 
 # fmt: off
 _LID_RAD: Final = pi / 2  # of a toilet, close before its cistern
 
 
-@family(group="toilet", nyu40=TOILET, place=Place.FLOOR, variants=36,
-    size=lambda m: (m.pick(0.36, 0.38, 0.4), m.pick(0.6, 0.64, 0.66, 0.7),
-    m.pick(0.76, 0.8, 0.82, 0.86, 1.0)))
+@catalogued()
 def toilet(m: Maker, size: Size) -> None:
     """A toilet.
 
@@ -173,9 +170,7 @@ def basin_bowl(m: Maker, form: int, w: float, d: float, back: float, y: float, d
     m.cylinder(0.022, y - 0.86 * deep, y - 0.78 * deep, n=14, at=(0.0, 0.0, z + 0.03), of=CHROME)
 
 
-@family(group="washbasin", nyu40=SINK, place=Place.FLOOR, called="washbasin_with_cabinet",
-    variants=28, size=lambda m: (m.pick(0.5, 0.6, 0.6, 0.7, 0.8, 0.9), m.pick(0.42, 0.45, 0.48),
-    m.pick(0.98, 1.0, 1.02)))
+@catalogued()
 def vanity(m: Maker, size: Size) -> None:
     """A basin in a cupboard.
 
@@ -220,8 +215,7 @@ def vanity(m: Maker, size: Size) -> None:
     m.rod(0.0, (y - 0.1, h), back + 0.05, 0.004, n=6, of=tap)
 
 
-@family(group="washbasin", nyu40=SINK, place=Place.FLOOR, called="washbasin", variants=16,
-    size=lambda m: (m.pick(0.5, 0.55, 0.6, 0.65), m.pick(0.42, 0.45, 0.5), m.pick(0.97, 1.0)))
+@catalogued()
 def pedestal_basin(m: Maker, size: Size) -> None:
     """A basin on a column."""
     w, d, h = size
@@ -245,9 +239,7 @@ def pedestal_basin(m: Maker, size: Size) -> None:
     m.rod(0.0, (y - 0.1, h), back + 0.05, 0.004, n=6, of=tap)
 
 
-@family(group="washbasin", nyu40=SINK, place=Place.WALL, called="wall_washbasin", variants=20,
-    size=lambda m: (m.pick(0.4, 0.45, 0.5, 0.55, 0.6), m.pick(0.33, 0.38, 0.42, 0.46),
-    m.pick(0.5, 0.52)))
+@catalogued()
 def wall_basin(m: Maker, size: Size) -> None:
     """A basin that hangs: its waste pipe shows, or is behind a shield."""
     w, d, h = size
@@ -264,9 +256,7 @@ def wall_basin(m: Maker, size: Size) -> None:
     m.rod(0.0, (y - 0.1, h), 0.05, 0.004, n=6, of=tap)
 
 
-@family(group="bathtub", nyu40=BATHTUB, place=Place.FLOOR, variants=32,
-    size=lambda m: (m.pick(1.5, 1.6, 1.7, 1.7, 1.8), m.pick(0.7, 0.75, 0.8),
-    m.pick(0.6, 0.62, 0.65)))
+@catalogued()
 def bathtub(m: Maker, size: Size) -> None:
     """A bath.
 
@@ -331,9 +321,7 @@ def bath_hollow(m: Maker, w: float, d: float, h: float, p: float) -> None:
         h - 0.405)], column="power", n=36))
 
 
-@family(group="shower", nyu40=OTHERSTRUCTURE, place=Place.FLOOR, variants=28,
-    size=lambda m: (m.pick(0.8, 0.9, 0.9, 1.0), m.pick(0.8, 0.8, 0.9, 1.0),
-    m.pick(1.95, 2.0, 2.05)))
+@catalogued()
 def shower(m: Maker, size: Size) -> None:
     """A shower in a corner.
 

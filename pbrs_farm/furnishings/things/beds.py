@@ -6,14 +6,13 @@ from dataclasses import dataclass
 from itertools import product
 from typing import Annotated
 
-from pbrs_farm.core.catalogue import Place
-from pbrs_farm.core.classes import BED
 from pbrs_farm.core.frames import rotation_x
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import mix
 from pbrs_farm.dress.thing_materials import BLACK_STEEL, BRASS, WHITE, WHITE_STEEL, glossy, plain
+from pbrs_farm.furnishings.things.catalogued import catalogued
 from pbrs_farm.furnishings.things.cloth import draped
-from pbrs_farm.furnishings.things.maker import Maker, Size, family
+from pbrs_farm.furnishings.things.maker import Maker, Size
 from pbrs_farm.furnishings.things.parameters import Choice, Legs, Range
 from pbrs_farm.furnishings.things.shapes import Pair, row
 from pbrs_farm.geometry.outlines import bent
@@ -203,17 +202,13 @@ def bed_linen(m: Maker, size: Size, p: Bed) -> None:
                 at=(x, top + 0.5 * depth - 0.02, back + 0.11))
 
 
-@family(group="bed", nyu40=BED, place=Place.FLOOR, called="bed", variants=36,
-    size=lambda m: (m.pick(1.45, 1.65, 1.65, 1.85), m.pick(2.08, 2.12, 2.16),
-    m.pick(0.85, 0.95, 1.05, 1.15)), draw=lambda m, size: draw_bed(m, size, 2))
+@catalogued(draw=lambda m, size: draw_bed(m, size, 2))
 def double_bed(m: Maker, size: Size, p: Bed) -> None:
     """A bed for two with mattress, duvet and two pillows; some have a throw."""
     build_bed(m, size, p)
 
 
-@family(group="bed", nyu40=BED, place=Place.FLOOR, called="single_bed", variants=24,
-    size=lambda m: (m.pick(0.86, 0.95, 0.95, 1.05), m.pick(2.04, 2.08, 2.12),
-    m.pick(0.7, 0.8, 0.9, 1.0)), draw=lambda m, size: draw_bed(m, size, 1))
+@catalogued(draw=lambda m, size: draw_bed(m, size, 1))
 def single_bed(m: Maker, size: Size, p: Bed) -> None:
     """A bed for one with mattress, duvet and a pillow."""
     build_bed(m, size, p)

@@ -7,13 +7,13 @@ from typing import Final
 
 from numpy import pi
 
-from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import mix
 from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.furnishings.things.boxes import rope_side
-from pbrs_farm.furnishings.things.maker import Maker, Size, family, thing
+from pbrs_farm.furnishings.things.catalogued import catalogued
+from pbrs_farm.furnishings.things.maker import Maker, Size, thing
 from pbrs_farm.geometry.outlines import bent, d_shape, oval, polar, rect, rings, scaled
 
 # fmt: off
@@ -159,7 +159,7 @@ def _drawn_size(m: Maker) -> Size:
     return 2 * r * w, 2 * r * d, tall * h
 
 
-@family(group="bin", place=Place.FLOOR, called="bin", variants=40, size=_drawn_size)
+@catalogued(size=_drawn_size)
 def standing_bin(m: Maker, size: Size) -> None:
     """A bin of the catalogue, in a form with the same ratio of depth to width."""
     w, d, h = size

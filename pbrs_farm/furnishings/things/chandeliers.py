@@ -6,8 +6,6 @@ from typing import Final
 
 from numpy import cos, pi, sin
 
-from pbrs_farm.core.catalogue import Place
-from pbrs_farm.core.classes import LAMP
 from pbrs_farm.core.frames import rotation_y, rotation_z
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.thing_materials import (
@@ -19,7 +17,8 @@ from pbrs_farm.dress.thing_materials import (
     glass,
     plain,
 )
-from pbrs_farm.furnishings.things.maker import Maker, Size, family
+from pbrs_farm.furnishings.things.catalogued import catalogued
+from pbrs_farm.furnishings.things.maker import Maker, Size
 from pbrs_farm.geometry.outlines import bent, oval, polar
 
 # fmt: off
@@ -238,9 +237,7 @@ def rods(m: Maker, r: float, h: float, of: Material) -> None:
 _KINDS = (arms, arms, wheel, crystal, sputnik, branches, lantern, rods)
 
 
-@family(group="ceiling_lamp", nyu40=LAMP, place=Place.CEILING, called="chandelier", variants=24,
-    size=lambda m: (*m.pick((0.5, 0.5), (0.58, 0.58), (0.66, 0.66), (0.74, 0.74)),
-    m.uniform(0.5, 0.8)))
+@catalogued()
 def chandelier(m: Maker, size: Size) -> None:
     """A chandelier.
 

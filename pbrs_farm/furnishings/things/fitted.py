@@ -7,8 +7,6 @@ from __future__ import annotations
 
 from typing import Final
 
-from pbrs_farm.core.catalogue import Place
-from pbrs_farm.core.classes import BOOKSHELF, CABINET
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.thing_materials import (
     BLACK_STEEL,
@@ -20,6 +18,7 @@ from pbrs_farm.dress.thing_materials import (
     WHITE_STEEL,
     glossy,
 )
+from pbrs_farm.furnishings.things.catalogued import catalogued
 from pbrs_farm.furnishings.things.joints import (
     Inside,
     Look,
@@ -29,7 +28,7 @@ from pbrs_farm.furnishings.things.joints import (
     pull,
     shelves,
 )
-from pbrs_farm.furnishings.things.maker import Maker, Size, family
+from pbrs_farm.furnishings.things.maker import Maker, Size
 from pbrs_farm.furnishings.things.shapes import Pair
 
 # fmt: off
@@ -56,9 +55,7 @@ def _filled_in(m: Maker, size: Size, front: float, foot: float, of: Material) ->
     return (-w / 2 + side, w / 2 - side), (foot, h - top)
 
 
-@family(group="fitted_wardrobe", nyu40=CABINET, place=Place.FLOOR, called="fitted_wardrobe",
-    variants=36, size=lambda m: (m.pick(1.5, 1.8, 2.1, 2.5, 2.9, 3.4, 3.9), m.pick(0.56, 0.6, 0.62),
-    m.pick(2.4, 2.5, 2.6)))
+@catalogued()
 def fitted_wardrobe(m: Maker, size: Size) -> None:
     """Doors from wall to wall: as high as the room, in two rows, or sliding, some of mirror."""
     _w, d, _h = size
@@ -119,9 +116,7 @@ def _leaves(m: Maker, x: Pair, y: Pair, z: float, back: float, front: Material,
         shelves(m, inner, y, (back, z - 0.03), body, CHROME if k % 2 == 0 else None)
 
 
-@family(group="fitted_bookcase", nyu40=BOOKSHELF, place=Place.FLOOR, called="fitted_bookcase",
-    variants=36, size=lambda m: (m.pick(1.5, 1.8, 2.1, 2.5, 2.9, 3.4, 3.9), m.pick(0.28, 0.3, 0.34),
-    m.pick(2.4, 2.5, 2.6)))
+@catalogued()
 def fitted_bookcase(m: Maker, size: Size) -> None:
     """Shelves from wall to wall: down to the floor, over cupboards or drawers, or beside a closed bay."""
     _w, d, _h = size
@@ -159,9 +154,7 @@ def fitted_bookcase(m: Maker, size: Size) -> None:
             Inside(back, has_boards=False))
 
 
-@family(group="fitted_cabinet", nyu40=CABINET, place=Place.FLOOR, called="fitted_show_case",
-    variants=24, size=lambda m: (m.pick(1.3, 1.5, 1.8, 2.1), m.pick(0.4, 0.44, 0.48),
-    m.pick(2.1, 2.3, 2.5)))
+@catalogued()
 def fitted_cabinet(m: Maker, size: Size) -> None:
     """Doors of glass with china behind them over a deeper row of cupboards or drawers."""
     w, d, h = size

@@ -14,8 +14,6 @@ from typing import Annotated, Final
 import numpy as np
 
 from pbrs_farm.core.arrays import I32
-from pbrs_farm.core.catalogue import Place
-from pbrs_farm.core.classes import CABINET, COUNTER, OTHERFURNITURE, REFRIGERATOR, SINK
 from pbrs_farm.core.frames import LYING_ALONG_X, LYING_ALONG_Z
 from pbrs_farm.core.house import Material, Surface
 from pbrs_farm.dress.style import mix
@@ -35,6 +33,7 @@ from pbrs_farm.dress.thing_materials import (
     glossy,
     plain,
 )
+from pbrs_farm.furnishings.things.catalogued import catalogued
 from pbrs_farm.furnishings.things.joints import (
     Inside,
     Look,
@@ -48,7 +47,7 @@ from pbrs_farm.furnishings.things.joints import (
     pull,
     shell,
 )
-from pbrs_farm.furnishings.things.maker import Maker, Size, family
+from pbrs_farm.furnishings.things.maker import Maker, Size
 from pbrs_farm.furnishings.things.parameters import Choice, Front, Pull, Range
 from pbrs_farm.furnishings.things.shapes import Pair, row
 from pbrs_farm.geometry.bodies import creased
@@ -161,24 +160,21 @@ def unit(m: Maker, size: Size, k: KitchenSet, p: KitchenUnit) -> None:
         Inside(-d / 2 + _BACK_M))
 
 
-@family(group="base_cabinet", nyu40=COUNTER, place=Place.KITCHEN, called="kitchen_cabinet",
-    variants=32, of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h), draw=lambda m, _size,
+@catalogued(of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h), draw=lambda m, _size,
     k: draw_unit(m, k, "door", "low_door", "three_drawers", "low_two_drawers", "two_doors"))
 def base_cabinet(m: Maker, size: Size, k: KitchenSet, p: KitchenUnit) -> None:
     """A kitchen's unit with a worktop: doors, drawers, or both."""
     unit(m, size, k, p)
 
 
-@family(group="base_cabinet", nyu40=COUNTER, place=Place.KITCHEN, called="kitchen_cabinet",
-    variants=32, of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h), draw=lambda m, _size,
+@catalogued(of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h), draw=lambda m, _size,
     k: draw_unit(m, k, "low_two_drawers", "two_drawers", "four_drawers", "low_door"))
 def drawer_cabinet(m: Maker, size: Size, k: KitchenSet, p: KitchenUnit) -> None:
     """A second unit of the kitchen, mostly of drawers."""
     unit(m, size, k, p)
 
 
-@family(group="blind_cabinet", nyu40=COUNTER, place=Place.KITCHEN, called="kitchen_blind_cabinet",
-    variants=32, of_set=kitchen_set, size=lambda m, k: (0.67, 0.588, k.top_h))
+@catalogued(of_set=kitchen_set, size=lambda m, k: (0.67, 0.588, k.top_h))
 def blind_cabinet(m: Maker, size: Size, k: KitchenSet) -> None:
     """A blind unit for the corner of a kitchen, its front fixed."""
     w, h = size[0], size[2]
@@ -188,8 +184,7 @@ def blind_cabinet(m: Maker, size: Size, k: KitchenSet) -> None:
     panel(m, "flat", (-w / 2, w / 2), (k.plinth_h, h - k.top_t - 0.003), 0.251, k.look.front)
 
 
-@family(group="upper_cabinet", nyu40=CABINET, place=Place.WALL, called="kitchen_wall_cabinet",
-    variants=32, of_set=kitchen_set, size=lambda m, k: (0.6, 0.35, m.pick(0.6, 0.7, 0.72)))
+@catalogued(of_set=kitchen_set)
 def upper_cabinet(m: Maker, size: Size, k: KitchenSet) -> None:
     """A kitchen's cupboard on the wall: one door or two, a flap, glass, or open shelves."""
     w, d, h = size
@@ -211,8 +206,7 @@ def upper_cabinet(m: Maker, size: Size, k: KitchenSet) -> None:
         m.box(w - 2 * t, (h - t, h), (f, d), of=k.upper_look.front)
 
 
-@family(group="sink", nyu40=SINK, place=Place.KITCHEN, variants=32, of_set=kitchen_set,
-    size=lambda m, k: (0.8, 0.6, k.top_h + 0.3))
+@catalogued(of_set=kitchen_set, size=lambda m, k: (0.8, 0.6, k.top_h + 0.3))
 def kitchen_sink(m: Maker, size: Size, k: KitchenSet) -> None:
     """A unit with a sink in its worktop: one bowl, two, or one with a drainer; many taps."""
     w, d, h = size
@@ -390,8 +384,7 @@ def oven_front(m: Maker, x: Pair, y: Pair, z: float, panel_h: float, material: M
             against=z + 0.0199, of=BLACK_GLASS)
 
 
-@family(group="cooker", nyu40=OTHERFURNITURE, place=Place.KITCHEN, variants=32,
-    size=lambda m: (m.pick(0.5, 0.6, 0.6), 0.6, m.uniform(0.88, 0.92)))
+@catalogued()
 def cooker(m: Maker, size: Size) -> None:
     """A freestanding cooker between the units.
 
@@ -425,8 +418,7 @@ def cooker(m: Maker, size: Size) -> None:
         m.pick("bar", "bow", "square"), m.chance(0.8), m.pick(5, 6))
 
 
-@family(group="cooker", nyu40=OTHERFURNITURE, place=Place.KITCHEN, called="cooker", variants=32,
-    of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h))
+@catalogued(of_set=kitchen_set, size=lambda m, k: (0.6, 0.6, k.top_h))
 def built_in_cooker(m: Maker, size: Size, k: KitchenSet) -> None:
     """An oven in a unit of the kitchen, a hob in the worktop over it."""
     w, d, h = size
@@ -473,8 +465,7 @@ def draw_dishwasher(m: Maker, _size: Size, _k: KitchenSet) -> Dishwasher:
         m.pick(3, 4, 5), m.pick(CHROME, RUBBER))
 
 
-@family(group="dishwasher", nyu40=OTHERFURNITURE, place=Place.FLOOR, variants=32,
-    of_set=kitchen_set, draw=draw_dishwasher, size=lambda m, k: (0.6, 0.6, k.top_h))
+@catalogued(of_set=kitchen_set, draw=draw_dishwasher, size=lambda m, k: (0.6, 0.6, k.top_h))
 def dishwasher(m: Maker, size: Size, k: KitchenSet, p: Dishwasher) -> None:
     """A dishwasher under the kitchen's worktop: a front of the kitchen, or its own with a panel."""
     w, d, h = size
@@ -521,8 +512,7 @@ def dishwasher_front(m: Maker, k: KitchenSet, x: Pair, y: float, f: float, p: Di
             of=RUBBER)
 
 
-@family(group="hood", nyu40=OTHERFURNITURE, place=Place.KITCHEN, called="range_hood", variants=24,
-    size=lambda m: (0.6, m.pick(0.45, 0.48, 0.5), m.pick(0.3, 0.7, 0.8, 0.9)))
+@catalogued()
 def hood(m: Maker, size: Size) -> None:
     """An extractor over the cooker: a chimney, a pyramid, a dome, a glass plate, or a flat one."""
     w, d, h = size
@@ -600,9 +590,7 @@ def draw_fridge(m: Maker, size: Size) -> Fridge:
         m.chance(0.4 if is_wide else 0.12), m.chance(0.3) and not retro)
 
 
-@family(group="fridge", nyu40=REFRIGERATOR, place=Place.FLOOR, variants=32, draw=draw_fridge,
-    size=lambda m: (m.pick(0.55, 0.6, 0.6, 0.7, 0.9), m.uniform(0.6, 0.68),
-    m.pick(1.45, 1.75, 1.8, 1.86, 2.0)))
+@catalogued(draw=draw_fridge)
 def fridge(m: Maker, size: Size, p: Fridge) -> None:
     """A fridge.
 
@@ -747,8 +735,7 @@ def holed_plate(x: Pair, y: Pair, z: Pair, middle: Pair, r: float, *, n: int = 3
     return creased("plate", points, faces, radians(40))
 
 
-@family(group="washer", nyu40=OTHERFURNITURE, place=Place.FLOOR, variants=28,
-    size=lambda m: (m.pick(0.6, 0.6, 0.595), m.uniform(0.5, 0.64), m.uniform(0.84, 0.86)))
+@catalogued()
 def washing_machine(m: Maker, size: Size) -> None:
     """A machine with a round door in its front: drawer, dial and display above it."""
     w, d, h = size

@@ -7,8 +7,6 @@ from typing import Annotated
 
 from numpy import cos, pi, sin
 
-from pbrs_farm.core.catalogue import Place
-from pbrs_farm.core.classes import LAMP
 from pbrs_farm.core.frames import rotation_x, rotation_z
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.thing_materials import (
@@ -22,7 +20,8 @@ from pbrs_farm.dress.thing_materials import (
     glossy,
     plain,
 )
-from pbrs_farm.furnishings.things.maker import Maker, Size, family
+from pbrs_farm.furnishings.things.catalogued import catalogued
+from pbrs_farm.furnishings.things.maker import Maker, Size
 from pbrs_farm.furnishings.things.parameters import Choice, Range
 from pbrs_farm.geometry.outlines import bent, d_shape, fluted, oval, polar, rect, rings, scaled
 
@@ -71,9 +70,7 @@ def draw_floor_lamp(m: Maker, size: Size) -> FloorLamp:
     return p
 
 
-@family(group="floor_lamp", nyu40=LAMP, place=Place.FLOOR, called="floor_lamp", variants=36,
-    draw=draw_floor_lamp, size=lambda m: (*m.pick((0.36, 0.36), (0.4, 0.4), (0.46, 0.46)),
-    m.uniform(1.4, 1.72)))
+@catalogued(draw=draw_floor_lamp)
 def standing_lamp(m: Maker, size: Size, p: FloorLamp) -> None:
     """A lamp on the floor: a shade on a pole or a tripod, a column, or a ball."""
     w, d, h = size
@@ -106,8 +103,7 @@ def standing_lamp(m: Maker, size: Size, p: FloorLamp) -> None:
         shade_spokes(m, r, p.taper, tall, h, p.body)
 
 
-@family(group="floor_lamp", nyu40=LAMP, place=Place.FLOOR, called="reading_lamp", variants=16,
-    size=lambda m: (m.pick(0.44, 0.48), m.pick(0.26, 0.28), m.uniform(1.4, 1.65)))
+@catalogued()
 def arc_lamp(m: Maker, size: Size) -> None:
     """A floor lamp that leans over: an arc, or two arms to read by."""
     w, d, h = size
@@ -168,9 +164,7 @@ def draw_table_lamp(m: Maker, size: Size) -> TableLamp:
     return p
 
 
-@family(group="table_lamp", nyu40=LAMP, place=Place.SURFACE, called="table_lamp", variants=36,
-    draw=draw_table_lamp, size=lambda m: (*m.pick((0.2, 0.2), (0.24, 0.24), (0.28, 0.28),
-    (0.32, 0.32)), m.uniform(0.32, 0.52)))
+@catalogued(draw=draw_table_lamp)
 def shade_lamp(m: Maker, size: Size, p: TableLamp) -> None:
     """A lamp on a table: a shade on a foot of clay, glass, wood or metal, a ball, or a mushroom."""
     w, _d, h = size
@@ -227,8 +221,7 @@ def lamp_foot(m: Maker, kind: str, q: float, f: float) -> None:
                 (q * 0.5, 0.7 * f), (q * 0.2, 0.9 * f), (q * 0.2, f)], n=20)
 
 
-@family(group="table_lamp", nyu40=LAMP, place=Place.SURFACE, called="desk_lamp", variants=16,
-    size=lambda m: (m.pick(0.3, 0.36, 0.42), 0.15, m.uniform(0.36, 0.5)))
+@catalogued()
 def arm_lamp(m: Maker, size: Size) -> None:
     """A lamp on a desk.
 
@@ -262,9 +255,7 @@ def arm_lamp(m: Maker, size: Size) -> None:
             m.sphere((0.0, 0.032, 0.0), 0.02, n=10, of=OPAL)
 
 
-@family(group="ceiling_lamp", nyu40=LAMP, place=Place.CEILING, called="ceiling_lamp", variants=48,
-    size=lambda m: (*m.pick((0.3, 0.3), (0.38, 0.38), (0.46, 0.46), (0.56, 0.56)),
-    m.pick(0.1, 0.13, 0.15, 0.5, 0.6, 0.7)))
+@catalogued()
 def hanging_lamp(m: Maker, size: Size) -> None:
     """A lamp under the ceiling: flat, or hung from a canopy if it is over 0.2 m high."""
     material = m.pick(m.metal, BLACK_STEEL, BRASS, WHITE_STEEL,
@@ -417,8 +408,7 @@ def bar_lamp(m: Maker, h: float, d: float, r: float, low: float, material: Mater
     m.cylinder(d / 2, h - 0.012, h - 0.001, n=24, of=material)
 
 
-@family(group="wall_lamp", nyu40=LAMP, place=Place.WALL, called="wall_lamp", variants=24,
-    size=lambda m: (m.pick(0.12, 0.16, 0.2), m.pick(0.1, 0.14, 0.18), m.pick(0.16, 0.2, 0.26)))
+@catalogued()
 def sconce(m: Maker, size: Size) -> None:
     """A lamp on a wall.
 

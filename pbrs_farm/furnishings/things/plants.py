@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
-from typing import Final, Literal
+from typing import Final
 
 import numpy as np
 from numpy import cos, pi, sin
@@ -301,7 +301,7 @@ class _Plant(Record):
 
     name: str
     called: str
-    place: Literal["FLOOR", "SURFACE"]
+    place: Place
     variants: int
     grow: str  # a key of _GROW
     pot_share: float
@@ -320,7 +320,7 @@ class _Plant(Record):
 
 
 PLANTS: Final = {
-    p.name: Family(p.name, p.called, "plant", OTHERPROP, Place[p.place], p.variants, p.size, p.build)
+    p.name: Family(p.name, p.called, "plant", OTHERPROP, p.place, p.variants, p.size, p.build)
     for p in read_csv(Path(__file__).with_name("plants.csv"), _Plant)
 }
 """Families by name, in the order from which seeds draw."""

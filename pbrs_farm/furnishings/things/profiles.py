@@ -15,7 +15,7 @@ from pbrs_farm.furnishings.things.shapes import Pair
 class Turned(Record):
     """A row of profiles.csv."""
 
-    of: str  # what kind of thing has it
+    of: str  # its kind of item
     name: str
     radius_m: float = 1.0
     height_m: float = 1.0

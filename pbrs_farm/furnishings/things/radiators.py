@@ -9,7 +9,8 @@ from pbrs_farm.core.classes import OTHERFURNITURE
 from pbrs_farm.core.frames import LYING_ALONG_X, rotation_z
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.thing_materials import CHROME, RUBBER, WHITE_STEEL, glossy, plain
-from pbrs_farm.furnishings.things.maker import Maker, Size, family, thing
+from pbrs_farm.furnishings.things.catalogued import catalogued
+from pbrs_farm.furnishings.things.maker import Maker, Size, thing
 from pbrs_farm.geometry.outlines import bent
 
 
@@ -57,9 +58,7 @@ def wall_radiator(m: Maker, width: float, height: float, paint: Material) -> Non
         of=plain("radiator valve", (0.9, 0.9, 0.89), 0.4))
 
 
-@family(group="radiator", nyu40=OTHERFURNITURE, place=Place.WALL, called="radiator", variants=28,
-    size=lambda m: (m.pick(0.6, 0.8, 1.0, 1.2, 1.4), m.pick(0.07, 0.09, 0.11, 0.13),
-    m.pick(0.45, 0.5, 0.6, 0.6)))
+@catalogued()
 def panel_radiator(m: Maker, size: Size) -> None:
     """A radiator.
 

@@ -10,7 +10,7 @@ from typing import Annotated
 from numpy import cos, pi, sin
 
 from pbrs_farm.core.catalogue import Place
-from pbrs_farm.core.classes import CHAIR, SOFA
+from pbrs_farm.core.classes import CHAIR
 from pbrs_farm.core.frames import rotation_x
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.thing_materials import (
@@ -23,9 +23,10 @@ from pbrs_farm.dress.thing_materials import (
     glossy,
     plain,
 )
+from pbrs_farm.furnishings.things.catalogued import catalogued
 from pbrs_farm.furnishings.things.cloth import chair_shell, tub
 from pbrs_farm.furnishings.things.joints import Inside, Look, fronts_of, hollow
-from pbrs_farm.furnishings.things.maker import Maker, Size, family, thing
+from pbrs_farm.furnishings.things.maker import Maker, Size, thing
 from pbrs_farm.furnishings.things.parameters import Choice, Range
 from pbrs_farm.furnishings.things.shapes import Pair, on_side, row
 from pbrs_farm.geometry.bodies import frustum, sheared
@@ -149,9 +150,7 @@ def draw_sofa(m: Maker, size: Size) -> Sofa:
         cushion, has_skirt, fold, throw, plain("fabric throw", throw_colour, 0.95))
 
 
-@family(group="sofa", nyu40=SOFA, place=Place.FLOOR, variants=56, draw=draw_sofa,
-    size=lambda m: (m.pick(1.45, 1.6, 1.7, 1.85, 1.95, 2.1, 2.2), m.uniform(0.82, 0.98),
-    m.uniform(0.74, 0.88)))
+@catalogued(draw=draw_sofa)
 def sofa(m: Maker, size: Size, p: Sofa) -> None:
     """A sofa of two or three seats.
 
@@ -228,8 +227,7 @@ def sofa_arm(m: Maker, size: Size, p: Sofa, x: Pair) -> None:
                     m.box(0.04, (low * 0.5, top - 0.034), 0.045, 0.004, x=middle, against=z)
 
 
-@family(group="corner_sofa", nyu40=SOFA, place=Place.FLOOR, called="corner_sofa", variants=16,
-    size=lambda m: (m.pick(2.2, 2.4, 2.6), m.pick(1.5, 1.6, 1.7), m.uniform(0.76, 0.86)))
+@catalogued()
 def chaise_sofa(m: Maker, size: Size) -> None:
     """A sofa with one seat long enough for a person at full length."""
     w, d, h = size
@@ -259,8 +257,7 @@ def chaise_sofa(m: Maker, size: Size) -> None:
             m.rounded(on_side(x, hw - aw, hw), (low, ah), (-hd + 0.005, z1 - 0.02), 0.04)
 
 
-@family(group="armchair", nyu40=CHAIR, place=Place.FLOOR, variants=36,
-    size=lambda m: (m.uniform(0.68, 0.86), m.uniform(0.7, 0.88), m.uniform(0.74, 1.0)))
+@catalogued()
 def armchair(m: Maker, size: Size) -> None:
     """An armchair: boxy, with wings, a tub, of bent wood, a shell on legs, a wooden frame."""
     w, d, h = size
@@ -405,8 +402,7 @@ def draw_chair(m: Maker, size: Size) -> Chair:
             return replace(p, fittings=fittings, pad=m.pick(soft, WICKER, m.timber))
 
 
-@family(group="chair", nyu40=CHAIR, place=Place.FLOOR, variants=36, draw=draw_chair,
-    size=lambda m: (m.uniform(0.42, 0.5), m.uniform(0.46, 0.54), m.uniform(0.78, 0.98)))
+@catalogued(draw=draw_chair)
 def chair(m: Maker, size: Size, p: Chair) -> None:
     """A chair to eat at.
 
@@ -519,9 +515,7 @@ def bent_chair(m: Maker, size: Size, p: Chair) -> None:
         at=(0.0, seat + (h - seat) * 0.385, -hd + 0.057), of=p.pad)
 
 
-@family(group="stool", nyu40=CHAIR, place=Place.FLOOR, called="stool", variants=20,
-    size=lambda m: (m.uniform(0.32, 0.4), m.uniform(0.32, 0.4),
-    m.pick(0.42, 0.45, 0.48, 0.62, 0.65)))
+@catalogued()
 def kitchen_stool(m: Maker, size: Size) -> None:
     """A stool: round or square, of wood, with a pad, of metal."""
     w, d, h = size
@@ -550,8 +544,7 @@ def kitchen_stool(m: Maker, size: Size) -> None:
                 m.disc(w, d, h - 0.07, h, 0.03, n=28)
 
 
-@family(group="stool", nyu40=CHAIR, place=Place.FLOOR, called="bench", variants=20,
-    size=lambda m: (m.pick(0.8, 0.9, 1.0, 1.2), m.pick(0.32, 0.36, 0.4), m.pick(0.44, 0.46, 0.48)))
+@catalogued()
 def hall_bench(m: Maker, size: Size) -> None:
     """A bench for a hall or a bed's foot: boards, a pad, a shelf for shoes, or a box."""
     w, d, h = size
@@ -581,8 +574,7 @@ def hall_bench(m: Maker, size: Size) -> None:
             m.rounded(w, (h - 0.05, h), d, 0.02, of=soft)
 
 
-@family(group="office_chair", nyu40=CHAIR, place=Place.FLOOR, called="office_chair", variants=28,
-    size=lambda m: (m.uniform(0.58, 0.66), m.uniform(0.58, 0.66), m.uniform(0.86, 1.14)))
+@catalogued()
 def swivel_chair(m: Maker, size: Size) -> None:
     """A chair that turns, on five arms with castors: a seat, a back of cloth or slats, armrests on some."""
     w, d, h = size

@@ -8,8 +8,6 @@ from typing import Annotated
 
 from numpy import cos, pi, sin
 
-from pbrs_farm.core.catalogue import Place
-from pbrs_farm.core.classes import BOOKSHELF, CABINET, DRESSER, OTHERPROP, SHELVES
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.thing_materials import (
     BLACK_STEEL,
@@ -21,8 +19,9 @@ from pbrs_farm.dress.thing_materials import (
     WHITE_STEEL,
     glossy,
 )
+from pbrs_farm.furnishings.things.catalogued import catalogued
 from pbrs_farm.furnishings.things.joints import Inside, Look, fronts_of, hollow, panel, shelves
-from pbrs_farm.furnishings.things.maker import Maker, Size, family
+from pbrs_farm.furnishings.things.maker import Maker, Size
 from pbrs_farm.furnishings.things.parameters import Choice, Front, Legs, Pull, Range
 from pbrs_farm.furnishings.things.shapes import Pair, row
 from pbrs_farm.geometry.outlines import bent, oval, polar, rect
@@ -100,9 +99,7 @@ def draw_bookcase(m: Maker, size: Size) -> Bookcase:
     return p
 
 
-@family(group="bookcase", nyu40=BOOKSHELF, place=Place.FLOOR, called="bookcase", variants=40,
-    draw=draw_bookcase, size=lambda m: (m.pick(0.45, 0.6, 0.8, 0.8, 0.9, 1.0, 1.2),
-    m.pick(0.26, 0.28, 0.3, 0.34), m.pick(0.9, 1.1, 1.5, 1.8, 1.9, 2.0, 2.1)))
+@catalogued(draw=draw_bookcase)
 def open_bookcase(m: Maker, size: Size, p: Bookcase) -> None:
     """A bookcase: plain, fronts below, a crown and a plinth, staggered, or a frame of metal."""
     match p.form:
@@ -190,9 +187,7 @@ def metal_bookcase(m: Maker, size: Size, p: Bookcase) -> None:
         m.box(0.014, 0.016, d - 0.04, 0.001, left=0.003 - hw, on=y + 0.004, mirrored="x", of=p.bars)
 
 
-@family(group="shelves", nyu40=SHELVES, place=Place.FLOOR, called="shelves", variants=32,
-    size=lambda m: (m.pick(0.36, 0.42, 0.6, 0.77, 0.8, 0.9), m.pick(0.28, 0.32, 0.36, 0.39),
-    m.pick(0.77, 1.1, 1.47, 1.6, 1.8)))
+@catalogued()
 def open_shelves(m: Maker, size: Size) -> None:
     """Shelves.
 
@@ -303,9 +298,7 @@ def draw_wardrobe(m: Maker, size: Size) -> Wardrobe:
     return replace(p, form="one_mirror", mirror=m.pick(0, 1)) if m.chance(0.6) else p
 
 
-@family(group="wardrobe", nyu40=CABINET, place=Place.FLOOR, variants=36, draw=draw_wardrobe,
-    size=lambda m: (m.pick(0.8, 0.9, 1.0, 1.2, 1.5, 1.8), m.pick(0.5, 0.55, 0.58, 0.6),
-    m.pick(1.85, 1.95, 2.0, 2.1, 2.2)))
+@catalogued(draw=draw_wardrobe)
 def wardrobe(m: Maker, size: Size, p: Wardrobe) -> None:
     """A wardrobe: doors on hinges, some with drawers, panels or a mirror, or sliding leaves."""
     w, d, h = size
@@ -370,9 +363,7 @@ def sliding_leaves(m: Maker, p: Wardrobe, x: Pair, y: Pair, z: Pair, inside: Ins
         shelves(m, space, (low, top), (inside.back, z[0]), p.body, clothes_rail)
 
 
-@family(group="dresser", nyu40=DRESSER, place=Place.FLOOR, called="chest_of_drawers", variants=36,
-    size=lambda m: (m.pick(0.6, 0.75, 0.8, 0.9, 1.0, 1.2, 1.4), m.pick(0.38, 0.42, 0.45, 0.48),
-    m.uniform(0.62, 1.15)))
+@catalogued()
 def drawer_chest(m: Maker, size: Size) -> None:
     """A chest of drawers: rows of one to three, doors beside them, legs, plinth or buns."""
     w, d, h = size
@@ -411,9 +402,7 @@ def drawer_chest(m: Maker, size: Size) -> None:
                 [("low", "door"), ("low", "door")]), False, inside)
 
 
-@family(group="cabinet", nyu40=CABINET, place=Place.FLOOR, called="cabinet", variants=32,
-    size=lambda m: (m.pick(0.4, 0.6, 0.8, 0.9, 1.0, 1.2), m.pick(0.34, 0.38, 0.42),
-    m.pick(0.8, 0.9, 1.15, 1.4, 1.75, 1.9)))
+@catalogued()
 def sideboard_cabinet(m: Maker, size: Size) -> None:
     """A cabinet: a sideboard, a highboard, a show case with glass, a narrow tall one."""
     w, d, h = size
@@ -449,9 +438,7 @@ def sideboard_cabinet(m: Maker, size: Size) -> None:
                 False, inside._replace(has_boards=False))
 
 
-@family(group="clothes_rack", nyu40=OTHERPROP, place=Place.FLOOR, called="coat_rack", variants=40,
-    size=lambda m: (*m.pick((0.46, 0.46), (0.5, 0.5), (0.8, 0.42), (0.9, 0.4), (1.0, 0.45),
-    (0.7, 0.38)), m.pick(1.65, 1.7, 1.75, 1.8)))
+@catalogued()
 def coat_stand(m: Maker, size: Size) -> None:
     """A coat stand.
 

@@ -8,8 +8,6 @@ from typing import Annotated
 
 from numpy import pi
 
-from pbrs_farm.core.catalogue import Place
-from pbrs_farm.core.classes import DESK, NIGHT_STAND, OTHERFURNITURE, TABLE, TELEVISION
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.thing_materials import (
     BLACK_GLASS,
@@ -22,8 +20,9 @@ from pbrs_farm.dress.thing_materials import (
     glass,
     glossy,
 )
+from pbrs_farm.furnishings.things.catalogued import catalogued
 from pbrs_farm.furnishings.things.joints import Inside, Look, fronts_of, hollow
-from pbrs_farm.furnishings.things.maker import Maker, Size, family
+from pbrs_farm.furnishings.things.maker import Maker, Size
 from pbrs_farm.furnishings.things.parameters import Choice, Front, Legs, Pull, Range
 from pbrs_farm.furnishings.things.shapes import on_side, row
 from pbrs_farm.geometry.outlines import bent, oval, polar, rect, rings
@@ -149,10 +148,7 @@ def draw_dining_table(m: Maker, size: Size) -> DiningTable:
     return DiningTable(top, under, legs, t, material, frame, column)
 
 
-@family(group="dining_table", nyu40=TABLE, place=Place.FLOOR, variants=36, draw=draw_dining_table,
-    size=lambda m: (*m.pick((0.7, 0.7), (0.8, 0.8), (1.0, 1.0), (1.1, 1.1), (1.2, 0.75), (1.2, 0.8),
-    (1.4, 0.8), (1.4, 0.85), (1.6, 0.9), (1.8, 0.9), (2.0, 0.95), (2.2, 1.0)),
-    m.uniform(0.73, 0.77)))
+@catalogued(draw=draw_dining_table)
 def dining_table(m: Maker, size: Size, p: DiningTable) -> None:
     """A table for two to eight: square, long, round or oval on legs, frames, trestles or one foot."""
     w, d, h = size
@@ -162,9 +158,7 @@ def dining_table(m: Maker, size: Size, p: DiningTable) -> None:
     under_top(m, p.under, w * inset, d * inset, low + 0.001, p.frame, p.legs, p.column)
 
 
-@family(group="coffee_table", nyu40=TABLE, place=Place.FLOOR, variants=36,
-    size=lambda m: (*m.pick((0.8, 0.8), (0.85, 0.5), (0.9, 0.55), (1.0, 0.6), (1.1, 0.6),
-    (1.2, 0.65), (0.9, 0.8)), m.uniform(0.38, 0.46)))
+@catalogued()
 def coffee_table(m: Maker, size: Size) -> None:
     """A low table before a sofa.
 
@@ -294,9 +288,7 @@ def draw_desk(m: Maker, size: Size) -> Desk:
     return p
 
 
-@family(group="desk", nyu40=DESK, place=Place.FLOOR, variants=36, draw=draw_desk,
-    size=lambda m: (m.pick(0.95, 1.1, 1.2, 1.3, 1.4, 1.6), m.pick(0.55, 0.6, 0.65, 0.7),
-    m.uniform(0.73, 0.77)))
+@catalogued(draw=draw_desk)
 def desk(m: Maker, size: Size, p: Desk) -> None:
     """A desk on legs, with drawers at one side or both, with flaps below the top, or with a shelf."""
     w, d, h = size
@@ -340,8 +332,7 @@ def desk_drawers(m: Maker, size: Size, p: Desk, look: Look) -> None:
                 m.leg(kind, (foot, z), low + 0.001, 0.045, of=of)
 
 
-@family(group="nightstand", nyu40=NIGHT_STAND, place=Place.FLOOR, variants=40,
-    size=lambda m: (m.uniform(0.36, 0.52), m.uniform(0.34, 0.42), m.uniform(0.42, 0.6)))
+@catalogued()
 def nightstand(m: Maker, size: Size) -> None:
     """A nightstand.
 
@@ -410,9 +401,7 @@ def nightstand(m: Maker, size: Size) -> None:
             m.box(w - 0.034, (0.127, 0.139), d - 0.02, of=m.pick(m.timber, body))
 
 
-@family(group="tv_stand", nyu40=OTHERFURNITURE, place=Place.FLOOR, called="tv_stand", variants=32,
-    size=lambda m: (m.pick(1.2, 1.4, 1.5, 1.6, 1.8), m.pick(0.38, 0.4, 0.42, 0.45),
-    m.uniform(0.4, 0.58)))
+@catalogued()
 def tv_bench(m: Maker, size: Size) -> None:
     """A low bench for a television.
 
@@ -452,9 +441,7 @@ def tv_bench(m: Maker, size: Size) -> None:
                 Inside(-hd + 0.008))
 
 
-@family(group="tv", nyu40=TELEVISION, place=Place.SURFACE, called="television", variants=20,
-    size=lambda m: m.pick((0.73, 0.2, 0.48), (0.97, 0.22, 0.63), (1.08, 0.24, 0.69),
-    (1.22, 0.26, 0.77)))
+@catalogued()
 def screen(m: Maker, size: Size) -> None:
     """A television.
 
