@@ -42,6 +42,14 @@ Several = Annotated[tuple[_Of, ...], BeforeValidator(_several)]
 """Some of a kind, in one cell with | between them."""
 
 
+def _spaced(value: object) -> object:
+    return value.split() if isinstance(value, str) else value
+
+
+Spaced = Annotated[_Of, BeforeValidator(_spaced)]
+"""A tuple of numbers, in one cell with spaces between them: a colour, a point."""
+
+
 def read_toml(path: Path, kind: type[_T]) -> _T:
     """Read a TOML table of the package as a kind that pydantic validates; BadInput names file and entry."""
     return _read(path, kind, tomllib.loads)

@@ -1,12 +1,14 @@
-"""Facades of buildings outside: walls, windows, doors, roofs, by style; no effects."""
+"""Facades of buildings outside: walls, windows, doors, roofs, by style. Effect: reads facades.csv."""
 
 from __future__ import annotations
 
-from typing import Final, NamedTuple
+from pathlib import Path
+from typing import Final, Literal, NamedTuple
 
 import numpy as np
 
 from pbrs_farm.core.arrays import F32, F64
+from pbrs_farm.core.record import Record, Several, Spaced, read_csv
 from pbrs_farm.dress.noise import noise
 from pbrs_farm.furnishings.surroundings.scenery import Rgb, SceneryMaterial
 
@@ -18,18 +20,19 @@ N_ROOMS: Final = 4  # lit rooms side by side in their picture
 _GLASS: Final = (0.022, 0.027, 0.030)
 
 
-class Style(NamedTuple):
-    """A kind of building that streets have."""
+class Style(Record):
+    """A kind of building: a row of facades.csv."""
 
+    where: Literal["town", "garden"]
     name: str
-    wall: str  # plaster, brick, stone, panels or boards
-    colours: tuple[Rgb, ...]  # of the wall, linear
-    trims: tuple[Rgb, ...]  # of sills, bands and what surrounds windows
-    frames: tuple[Rgb, ...]
-    roofs: tuple[Rgb, ...]
-    bay_m: tuple[float, float]
-    window_m: tuple[float, float]  # width and height, about
-    bars: tuple[str, ...]  # how its windows are divided
+    wall: Literal["plaster", "brick", "stone", "panels", "boards"]
+    colours: Several[Spaced[Rgb]]  # of the wall, linear
+    trims: Several[Spaced[Rgb]]  # of sills, bands and what surrounds windows
+    frames: Several[Spaced[Rgb]]
+    roofs: Several[Spaced[Rgb]]
+    bay_m: Spaced[tuple[float, float]]  # least and greatest
+    window_m: Spaced[tuple[float, float]]  # width and height, about
+    bars: Several[str]  # how its windows are divided
     surround_m: float  # width of the band about a window, 0 = none
     is_flat: bool = False  # of its roof
     shutters: float = 0.0  # share of facades with them
@@ -37,39 +40,9 @@ class Style(NamedTuple):
     cornice_m: float = 0.3
 
 
-_RED, _SLATE, _BROWN = (0.27, 0.085, 0.045), (0.085, 0.09, 0.10), (0.15, 0.085, 0.06)
-_WHITE, _DARK, _OAK, _GREEN = (
-    (0.72, 0.72, 0.69),
-    (0.035, 0.04, 0.045),
-    (0.16, 0.085, 0.04),
-    (0.03, 0.07, 0.05),
-)
-_SAND, _GREY, _PALE = (0.50, 0.44, 0.34), (0.33, 0.32, 0.30), (0.62, 0.60, 0.55)
-
-# fmt: off
-TOWN: Final[tuple[Style, ...]] = (
-    Style("rendered", "plaster", ((0.52, 0.44, 0.31), (0.60, 0.57, 0.50), (0.45, 0.33, 0.22), (0.42, 0.42, 0.39), (0.50, 0.40, 0.20), (0.44, 0.27, 0.20)),
-          (_PALE, _SAND), (_WHITE, _OAK), (_RED, _BROWN), (2.6, 3.2), (1.05, 1.65), ("two", "transom"), 0.13, shutters=0.4, balconies=0.2),
-    Style("stone", "stone", ((0.50, 0.45, 0.36), (0.42, 0.39, 0.33)), (_SAND,), (_WHITE, _GREY), (_SLATE,),
-          (2.3, 2.8), (1.05, 1.95), ("two", "transom"), 0.16, balconies=0.5, cornice_m=0.5),
-    Style("brick", "brick", ((0.26, 0.095, 0.06), (0.20, 0.10, 0.075), (0.36, 0.24, 0.14)), (_PALE, _SAND), (_WHITE, _DARK, _GREEN), (_SLATE, _BROWN),
-          (2.6, 3.3), (1.1, 1.6), ("sash", "two"), 0.0, balconies=0.15),
-    Style("modern", "plaster", ((0.66, 0.66, 0.63), (0.30, 0.31, 0.32), (0.55, 0.50, 0.43)), (_GREY,), (_DARK,), (_SLATE,),
-          (3.2, 4.0), (1.9, 1.6), ("one", "two"), 0.0, is_flat=True, balconies=0.35, cornice_m=0.12),
-    Style("panels", "panels", ((0.46, 0.45, 0.42), (0.52, 0.48, 0.40), (0.40, 0.43, 0.45)), (_PALE,), (_WHITE,), (_GREY,),
-          (3.0, 3.6), (1.6, 1.4), ("one", "two"), 0.0, is_flat=True, balconies=0.4, cornice_m=0.15),
-)
-# fmt: on
-# fmt: off
-HOUSES: Final[tuple[Style, ...]] = (
-    Style("cottage", "plaster", ((0.66, 0.64, 0.58), (0.56, 0.47, 0.33), (0.55, 0.55, 0.52)), (_PALE, _SAND), (_WHITE, _OAK), (_RED, _BROWN, _SLATE),
-          (2.9, 3.5), (1.25, 1.3), ("two", "transom"), 0.1, shutters=0.5),
-    Style("brick house", "brick", ((0.27, 0.10, 0.06), (0.33, 0.20, 0.12)), (_PALE,), (_WHITE, _GREEN), (_BROWN, _SLATE),
-          (2.9, 3.5), (1.3, 1.35), ("sash", "two"), 0.0),
-    Style("timber house", "boards", ((0.30, 0.08, 0.055), (0.55, 0.53, 0.47), (0.20, 0.12, 0.07), (0.25, 0.30, 0.32)), (_WHITE,), (_WHITE,), (_SLATE, _BROWN),
-          (2.9, 3.5), (1.2, 1.35), ("sash", "two"), 0.11),
-)
-# fmt: on
+_STYLES: Final = read_csv(Path(__file__).with_name("facades.csv"), Style)
+TOWN: Final = tuple(style for style in _STYLES if style.where == "town")
+HOUSES: Final = tuple(style for style in _STYLES if style.where == "garden")
 
 
 class Facade(NamedTuple):

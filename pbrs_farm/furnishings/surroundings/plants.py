@@ -1,12 +1,14 @@
-"""Trees, bushes and hedges: sprays of leaves with holes between them on branches; no effects."""
+"""Trees, bushes and hedges: sprays of leaves with holes. Effect: reads species.csv."""
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import Final, NamedTuple
 
 import numpy as np
 
 from pbrs_farm.core.arrays import F32, F64, Bools
+from pbrs_farm.core.record import Record, Spaced, read_csv
 from pbrs_farm.dress.noise import noise
 from pbrs_farm.furnishings.surroundings.scenery import Rgb, SceneryMaterial, Site, mottled
 from pbrs_farm.geometry.solids import box_quads
@@ -15,33 +17,21 @@ _PX: Final = 128  # of the picture of a spray of leaves
 _SHADE: Final = 0.66  # of the light that leaves inside a crown have, encoded
 
 
-class Species(NamedTuple):
-    """A kind of tree or bush."""
+class Species(Record):
+    """A kind of tree or bush: a row of species.csv."""
 
     name: str
-    dark: Rgb  # leaves, linear
-    light: Rgb
-    leaf_px: tuple[float, float]  # length and width in the picture of a spray
+    dark: Spaced[Rgb]  # leaves, linear
+    light: Spaced[Rgb]
+    leaf_px: Spaced[tuple[float, float]]  # length and width in the picture of a spray
     n_leaves: int  # in that picture
     radius: float  # of the crown over the tree's height
     crown_from: float  # its lower end over the tree's height
-    bark: tuple[Rgb, Rgb]
+    bark_dark: Spaced[Rgb]
+    bark_light: Spaced[Rgb]
 
 
-_BROWN_BARK: Final = ((0.03, 0.024, 0.018), (0.13, 0.105, 0.08))
-# Leaves reflect .03 to .17 of light; chroma as of the foliage patch of colour charts, (.095, .15, .056).
-# fmt: off
-SPECIES: Final[tuple[Species, ...]] = (
-    Species("lime", (0.026, 0.040, 0.016), (0.115, 0.160, 0.058), (17, 11), 80, 0.32, 0.30, _BROWN_BARK),
-    Species("oak", (0.022, 0.034, 0.014), (0.082, 0.115, 0.046), (19, 8), 88, 0.38, 0.26, _BROWN_BARK),
-    Species("birch", (0.034, 0.046, 0.018), (0.145, 0.180, 0.075), (13, 7.5), 105, 0.22, 0.24, ((0.10, 0.09, 0.08), (0.55, 0.53, 0.49))),
-    Species("fir", (0.012, 0.022, 0.015), (0.045, 0.070, 0.044), (30, 2.6), 150, 0.2, 0.10, _BROWN_BARK),
-    Species("copper beech", (0.030, 0.014, 0.012), (0.105, 0.055, 0.044), (18, 9), 80, 0.34, 0.24, _BROWN_BARK),
-    Species("plane", (0.034, 0.048, 0.022), (0.135, 0.175, 0.080), (21, 15), 52, 0.36, 0.34, ((0.10, 0.09, 0.06), (0.30, 0.28, 0.21))),
-    Species("privet", (0.018, 0.030, 0.013), (0.080, 0.115, 0.042), (10, 4.6), 210, 0.3, 0.1, _BROWN_BARK),
-    Species("yew", (0.012, 0.022, 0.012), (0.048, 0.070, 0.034), (12, 2.2), 330, 0.3, 0.1, _BROWN_BARK),
-)
-# fmt: on
+SPECIES: Final = read_csv(Path(__file__).with_name("species.csv"), Species)
 FIR: Final = 3
 TREES: Final = 6  # of SPECIES: the others are shrubs
 _N_TINTS: Final = 5
@@ -87,7 +77,7 @@ def leaves_of(rng: np.random.Generator, number: int) -> Leaves:
         for w, v in zip(np.clip(warm, -0.06, 0.06), value, strict=True)
     )
     solid = SceneryMaterial(f"{tree.name} dark", (0.86,) * 3, carpet, (0.6, 0.6))
-    bark = mottled(rng, *tree.bark, size=64)
+    bark = mottled(rng, tree.bark_dark, tree.bark_light, size=64)
     return Leaves(
         tree,
         spray,

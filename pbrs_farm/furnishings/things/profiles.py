@@ -4,11 +4,8 @@ from __future__ import annotations
 
 from functools import cache
 from pathlib import Path
-from typing import Annotated
 
-from pydantic import BeforeValidator
-
-from pbrs_farm.core.record import Record, Several, read_csv
+from pbrs_farm.core.record import Record, Several, Spaced, read_csv
 from pbrs_farm.furnishings.things.shapes import Pair
 
 
@@ -19,7 +16,7 @@ class Turned(Record):
     name: str
     radius_m: float = 1.0
     height_m: float = 1.0
-    profile: Several[Annotated[Pair, BeforeValidator(str.split)]]
+    profile: Several[Spaced[Pair]]
     label_from: float = 0.0
     label_to: float = 0.0
 
