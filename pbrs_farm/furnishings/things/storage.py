@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
+from functools import partial
 from itertools import product
 from typing import Annotated
 
@@ -444,98 +445,89 @@ def coat_stand(m: Maker, size: Size) -> None:
 
     A tree, a rail on posts, a ladder, a panel with hooks over a bench, a row of pegs on a frame.
     """
-    w, d, h = size
-    hw, hd = w / 2, d / 2
+    w = size[0]
     material = m.pick(m.timber, m.timber, m.dark_timber, BLACK_STEEL, WHITE_STEEL, m.metal,
         glossy("paint", m.paint(), 0.4))
     form = m.weighted(0.45, 0.35, 0.2) if w < 0.6 else 3 + m.weighted(0.3, 0.45, 0.25)
-    match form:
-        case 0:
-            coat_tree(m, w, h, d, material)
-        case 1:
-            crossed_sticks(m, w, h, d, material)
-        case 2:
-            coat_post(m, w, h, d, material)
-        case 3:
-            coat_rail(m, w, h, hw, hd, material)
-        case 4:
-            coat_panel(m, w, h, d, hw, hd, material)
-        case 5:
-            coat_ladder(m, w, h, d, hw, hd, material)
+    with m.of(material):
+        on_panel = partial(coat_panel, material=material)
+        (coat_tree, crossed_sticks, coat_post, coat_rail, on_panel, coat_ladder)[form](m, size)
 
 
-def coat_tree(m: Maker, w: float, h: float, d: float, material: Material) -> None:
+def coat_tree(m: Maker, size: Size) -> None:
     """A post with arms in two rings."""
-    with m.of(material):
-        n, foot = m.integers(3, 5), m.weighted(0.4, 0.35, 0.25)
-        m.rod(0.0, (0.02, h - 0.06), 0.0, 0.018, n=12)
-        m.sphere((0.0, h - 0.032, 0.0), 0.032, n=12)
-        if foot == 0:
-            m.turned([(d * 0.42, 0.0), (d * 0.42, 0.012), (0.03, 0.035)], n=30)
-        else:
-            for k in range(4):
-                m.tube(bent([(0.0, 0.28 if foot == 1 else 0.03, 0.0),
-                    polar((0.2 * w, 0.2 * d), 0.14 if foot == 1 else 0.03, k * pi / 2),
-                    polar((0.48 * w, 0.48 * d), 0.012, k * pi / 2)], 0.08, n=3), 0.013)
-        for k in range(2 * n):
-            a, y, r = pi * k / n, h - (0.16 if k % 2 else 0.34), 0.5 * w - 0.012
-            y = h - 0.18 if k % 2 else h - 0.34
-            m.tube(bent([(0.0, y - 0.04, 0.0), polar(0.6 * r, y - 0.01, a), polar(r, y + 0.1, a)],
-                0.06, n=3), 0.009, n=6)
-            m.sphere(polar(r, y + 0.105, a), 0.014, n=8)
+    w, d, h = size
+    n, foot = m.integers(3, 5), m.weighted(0.4, 0.35, 0.25)
+    m.rod(0.0, (0.02, h - 0.06), 0.0, 0.018, n=12)
+    m.sphere((0.0, h - 0.032, 0.0), 0.032, n=12)
+    if foot == 0:
+        m.turned([(d * 0.42, 0.0), (d * 0.42, 0.012), (0.03, 0.035)], n=30)
+    else:
+        for k in range(4):
+            m.tube(bent([(0.0, 0.28 if foot == 1 else 0.03, 0.0),
+                polar((0.2 * w, 0.2 * d), 0.14 if foot == 1 else 0.03, k * pi / 2),
+                polar((0.48 * w, 0.48 * d), 0.012, k * pi / 2)], 0.08, n=3), 0.013)
+    for k in range(2 * n):
+        a, y, r = pi * k / n, h - (0.16 if k % 2 else 0.34), 0.5 * w - 0.012
+        y = h - 0.18 if k % 2 else h - 0.34
+        m.tube(bent([(0.0, y - 0.04, 0.0), polar(0.6 * r, y - 0.01, a), polar(r, y + 0.1, a)],
+            0.06, n=3), 0.009, n=6)
+        m.sphere(polar(r, y + 0.105, a), 0.014, n=8)
 
 
-def crossed_sticks(m: Maker, w: float, h: float, d: float, material: Material) -> None:
+def crossed_sticks(m: Maker, size: Size) -> None:
     """Four or eight sticks that cross."""
-    with m.of(material):
-        n = m.pick(4, 4, 8)
-        for k in range(n):
-            a, b = 2 * pi * k / n, 2 * pi * k / n + 2.2
-            m.tube([polar((0.47 * w, 0.47 * d), 0.006, a), polar((0.4 * w, 0.4 * d), h - 0.006, b)],
-                0.015, end=0.011)
-            for s in (0.8, 0.93):
-                m.tube([polar((s * 0.4 * w, s * 0.4 * d), s * h, b, x=(1 - s) * 0.47 * w * cos(a),
-                    z=(1 - s) * 0.47 * d * sin(a)), polar(0.06, s * h + 0.04, b,
-                    x=(1 - s) * 0.47 * w * cos(a) + s * 0.4 * w * cos(b),
-                    z=(1 - s) * 0.47 * d * sin(a) + s * 0.4 * d * sin(b))], 0.007, n=6)
-        m.hoop(oval(0.2 * w, 0.2 * d, n=16), h * 0.5, 0.008)
+    w, d, h = size
+    n = m.pick(4, 4, 8)
+    for k in range(n):
+        a, b = 2 * pi * k / n, 2 * pi * k / n + 2.2
+        m.tube([polar((0.47 * w, 0.47 * d), 0.006, a), polar((0.4 * w, 0.4 * d), h - 0.006, b)],
+            0.015, end=0.011)
+        for s in (0.8, 0.93):
+            m.tube([polar((s * 0.4 * w, s * 0.4 * d), s * h, b, x=(1 - s) * 0.47 * w * cos(a),
+                z=(1 - s) * 0.47 * d * sin(a)), polar(0.06, s * h + 0.04, b,
+                x=(1 - s) * 0.47 * w * cos(a) + s * 0.4 * w * cos(b),
+                z=(1 - s) * 0.47 * d * sin(a) + s * 0.4 * d * sin(b))], 0.007, n=6)
+    m.hoop(oval(0.2 * w, 0.2 * d, n=16), h * 0.5, 0.008)
 
 
-def coat_post(m: Maker, w: float, h: float, d: float, material: Material) -> None:
+def coat_post(m: Maker, size: Size) -> None:
     """A post with a round board and a ring for umbrellas."""
-    with m.of(material):
-        m.rod(0.0, (0.0, h), 0.0, 0.016, n=10)
-        m.cylinder(d * 0.4, 0.0, 0.018, n=28)
-        m.hoop(oval(w * 0.6, d * 0.6, n=20), 0.5, 0.007)
-        for k in range(3):
-            m.tube([polar((0.3 * w, 0.3 * d), 0.5, 2.1 * k), (0.0, 0.5, 0.0)], 0.006, n=6)
-        for k in range(6):
-            m.tube(bent([(0.0, h - 0.1, 0.0), polar((0.3 * w, 0.3 * d), h - 0.14, k * 1.047),
-                (0.5 * w * cos(k * 1.047) * 0.97, h - 0.05, 0.5 * d * sin(k * 1.047) * 0.97)], 0.05,
-                n=3), 0.008, n=6)
+    w, d, h = size
+    m.rod(0.0, (0.0, h), 0.0, 0.016, n=10)
+    m.cylinder(d * 0.4, 0.0, 0.018, n=28)
+    m.hoop(oval(w * 0.6, d * 0.6, n=20), 0.5, 0.007)
+    for k in range(3):
+        m.tube([polar((0.3 * w, 0.3 * d), 0.5, 2.1 * k), (0.0, 0.5, 0.0)], 0.006, n=6)
+    for k in range(6):
+        m.tube(bent([(0.0, h - 0.1, 0.0), polar((0.3 * w, 0.3 * d), h - 0.14, k * 1.047),
+            (0.5 * w * cos(k * 1.047) * 0.97, h - 0.05, 0.5 * d * sin(k * 1.047) * 0.97)], 0.05,
+            n=3), 0.008, n=6)
 
 
-def coat_rail(m: Maker, w: float, h: float, hw: float, hd: float, material: Material) -> None:
+def coat_rail(m: Maker, size: Size) -> None:
     """A rail on two posts with a shelf below."""
+    w, d, h = size
+    hw, hd = w / 2, d / 2
     is_a = m.chance(0.5)
-    with m.of(material):
-        for s in (-1.0, 1.0):
-            if is_a:
-                m.square_tube((s * (hw - 0.02), 0.006, hd - 0.02), (s * (hw - 0.02), h - 0.02, 0.0),
-                    0.03, 0.03)
-                m.square_tube((s * (hw - 0.02), 0.006, -hd + 0.02),
-                    (s * (hw - 0.02), h - 0.02, 0.0), 0.03, 0.03)
-            else:
-                m.rod(s * (hw - 0.02), (0.02, h - 0.012), 0.0, 0.014, n=10)
-                m.rod(s * (hw - 0.02), 0.015, (-hd, hd), 0.015, n=10)
-        m.rod((-hw, hw), h - 0.016, 0.0, 0.0155, n=10)
-        for z in (-0.1, -0.03, 0.04, 0.1):
-            m.box(w - 0.04, (0.16, 0.178), 0.04, z=z)
+    for s in (-1.0, 1.0):
+        if is_a:
+            m.square_tube((s * (hw - 0.02), 0.006, hd - 0.02), (s * (hw - 0.02), h - 0.02, 0.0),
+                0.03, 0.03)
+            m.square_tube((s * (hw - 0.02), 0.006, -hd + 0.02),
+                (s * (hw - 0.02), h - 0.02, 0.0), 0.03, 0.03)
+        else:
+            m.rod(s * (hw - 0.02), (0.02, h - 0.012), 0.0, 0.014, n=10)
+            m.rod(s * (hw - 0.02), 0.015, (-hd, hd), 0.015, n=10)
+    m.rod((-hw, hw), h - 0.016, 0.0, 0.0155, n=10)
+    for z in (-0.1, -0.03, 0.04, 0.1):
+        m.box(w - 0.04, (0.16, 0.178), 0.04, z=z)
 
 
-def coat_panel(m: Maker, w: float, h: float, d: float, hw: float, hd: float,
-    material: Material) -> None:
+def coat_panel(m: Maker, size: Size, material: Material) -> None:
     """A panel with hooks over a bench."""
+    w, d, h = size
+    hw, hd = w / 2, d / 2
     panel_of = m.pick(material, WHITE, m.timber)
     if m.chance(0.5):
         m.box(w, (0.44, h), 0.02, 0.003, against=-hd, of=panel_of)
@@ -559,19 +551,19 @@ def coat_panel(m: Maker, w: float, h: float, d: float, hw: float, hd: float,
         m.box(w, (h - 0.02, h), 0.22, 0.003, against=-hd, of=panel_of)
 
 
-def coat_ladder(m: Maker, w: float, h: float, d: float, hw: float, hd: float,
-    material: Material) -> None:
+def coat_ladder(m: Maker, size: Size) -> None:
     """A ladder with pegs."""
-    with m.of(material):
-        for s in (-1.0, 1.0):
-            m.square_tube((s * (hw - 0.02), 0.006, hd - 0.025),
-                (s * (hw - 0.02), h - 0.006, -hd + 0.025), 0.03, 0.04)
-            m.square_tube((s * (hw - 0.02), 0.006, -hd + 0.02),
-                (s * (hw - 0.02), h * 0.7, -hd + 0.02 + 0.0 * h), 0.028, 0.03)
-        for k in range(4):
-            y = 0.2 + (h - 0.3) * k / 3
-            m.rod((-hw + 0.02, hw - 0.02), y, hd - 0.025 - (d - 0.05) * y / h, 0.013)
-        for k in range(5):
-            m.tube([(-hw + w * (k + 0.5) / 5, h - 0.1, -hd + 0.045),
-                (-hw + w * (k + 0.5) / 5, h - 0.06, -hd + 0.13)], 0.009, n=6)
-        m.box(w - 0.07, (0.12, 0.14), (-hd + 0.01, hd - 0.04), 0.002)
+    w, d, h = size
+    hw, hd = w / 2, d / 2
+    for s in (-1.0, 1.0):
+        m.square_tube((s * (hw - 0.02), 0.006, hd - 0.025),
+            (s * (hw - 0.02), h - 0.006, -hd + 0.025), 0.03, 0.04)
+        m.square_tube((s * (hw - 0.02), 0.006, -hd + 0.02),
+            (s * (hw - 0.02), h * 0.7, -hd + 0.02 + 0.0 * h), 0.028, 0.03)
+    for k in range(4):
+        y = 0.2 + (h - 0.3) * k / 3
+        m.rod((-hw + 0.02, hw - 0.02), y, hd - 0.025 - (d - 0.05) * y / h, 0.013)
+    for k in range(5):
+        m.tube([(-hw + w * (k + 0.5) / 5, h - 0.1, -hd + 0.045),
+            (-hw + w * (k + 0.5) / 5, h - 0.06, -hd + 0.13)], 0.009, n=6)
+    m.box(w - 0.07, (0.12, 0.14), (-hd + 0.01, hd - 0.04), 0.002)
