@@ -5,6 +5,7 @@ from __future__ import annotations
 from pbrs_farm.core.classes import PAPER
 from pbrs_farm.core.frames import rotation_y, rotation_z
 from pbrs_farm.dress.thing_materials import plain
+from pbrs_farm.furnishings.things.forms import formed
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.geometry.outlines import oval, rings, scaled
 
@@ -20,18 +21,15 @@ def toiletries(m: Maker) -> None:
             (0.9, 0.9, 0.88) if m.chance(0.6) else (0.1, 0.1, 0.1), 0.35))
         x += r
         with m.moved(at=(x, 0.0, m.uniform(-0.02, 0.02))):
+            formed(m, "toiletries", form, r=r, t=tall, of=side)
             match form:
                 case 0 | 1:  # the cap begins just above the bottle, so that no faces coincide
-                    m.revolve(scaled(r, tall, [(0, 0), (1, 0), (1, 0.78), (0.5, 0.84), (0, 0.84)]),
-                        n=14, of=side)
                     m.cylinder(r * 0.55, tall * 0.8402, tall, n=12, of=cap)
                 case 2:  # a tube on its cap
                     m.cylinder(r * 0.8, 0, 0.022, n=14, of=cap)
                     m.loft(rings(oval, [(2 * r, 2 * r, 0.0222), (2 * r, 1.6 * r, tall * 0.5),
                         (2 * r, 0.008, tall * 0.8), (2 * r, 0.004, tall * 0.9)], n=16), of=side)
                 case 3:  # with a pump
-                    m.revolve(scaled(r, tall, [(0, 0), (1, 0), (1, 0.7), (0.4, 0.78), (0, 0.78)]),
-                        n=14, of=side)
                     m.turned([(r * 0.4, tall * 0.7802), (r * 0.4, tall * 0.84),
                         (0.004, tall * 0.84), (0.004, tall * 0.95)], n=12, of=cap)
                     m.box(0.014, (tall * 0.95, tall), 0.042, 0.002, z=0.014, of=cap)
@@ -39,8 +37,6 @@ def toiletries(m: Maker) -> None:
                     m.cylinder(r, 0, 0.03, n=18, of=side)
                     m.cylinder(r * 1.02, 0.0302, 0.046, n=18, of=cap)
                 case 5:  # a can
-                    m.revolve(scaled(r, tall, [(0, 0), (0.8, 0), (0.8, 0.8), (0.5, 0.86),
-                        (0, 0.86)]), of=side)
                     m.revolve(scaled(r, tall, [(0, 0.8602), (0.72, 0.8602), (0.68, 1.04),
                         (0, 1.05)]), of=cap)
                 case 6:  # scent in square glass

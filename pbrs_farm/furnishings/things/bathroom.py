@@ -25,6 +25,7 @@ from pbrs_farm.dress.thing_materials import (
 )
 from pbrs_farm.furnishings.things.catalogued import catalogued
 from pbrs_farm.furnishings.things.cloth import hanging
+from pbrs_farm.furnishings.things.forms import formed
 from pbrs_farm.furnishings.things.joints import Inside, Look, fronts_of, hollow
 from pbrs_farm.furnishings.things.maker import Maker, Size
 from pbrs_farm.geometry.outlines import bent, d_shape, oval, rect, rings
@@ -224,17 +225,7 @@ def pedestal_basin(m: Maker, size: Size) -> None:
     basin_bowl(m, m.pick(0, 1, 1), w, d, back, y, m.pick(0.16, 0.18, 0.2))
     column = m.weighted(0.4, 0.3, 0.3)
     with m.of(CERAMIC), m.moved(at=(0.0, 0.0, back + 0.12)):
-        match column:
-            case 0:  # oval
-                m.loft(rings(oval, [(0.2 * s, 0.18, 0.0), (0.19 * s, 0.17, 0.02),
-                    (0.13 * s, 0.13, 0.14), (0.13 * s, 0.13, 0.5), (0.2 * s, 0.18, y - 0.14)]))
-            case 1:  # square
-                m.loft(rings(rect, [(0.2 * s, 0.18, 0.02, 0.0), (0.2 * s, 0.18, 0.02, 0.04),
-                    (0.15 * s, 0.14, 0.02, 0.06), (0.16 * s, 0.14, 0.02, 0.5),
-                    (0.2 * s, 0.18, 0.02, y - 0.14)]))
-            case 2:  # turned
-                m.turned([(0.1 * s, 0.0), (0.11 * s, 0.03), (0.07 * s, 0.07), (0.06 * s, 0.4),
-                    (0.075 * s, 0.6), (0.1 * s, y - 0.15)], n=22)
+        formed(m, "pedestal_basin", column, s=s, y=y)
     basin_tap(m, y - 0.003, back + 0.06, tap)
     m.rod(0.0, (y - 0.1, h), back + 0.05, 0.004, n=6, of=tap)
 

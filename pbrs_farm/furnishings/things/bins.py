@@ -13,6 +13,7 @@ from pbrs_farm.dress.style import mix
 from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.furnishings.things.boxes import rope_side
 from pbrs_farm.furnishings.things.catalogued import catalogued
+from pbrs_farm.furnishings.things.forms import formed
 from pbrs_farm.furnishings.things.maker import Maker, Size, thing
 from pbrs_farm.geometry.outlines import bent, d_shape, oval, polar, rect, rings, scaled
 
@@ -35,6 +36,7 @@ def bin(m: Maker) -> None:
 def bin_of(m: Maker, form: int, r: float, tall: float) -> None:
     """A bin about 2 r wide. form: 0 to 16; tall: without its lid."""
     material = m.metal if m.chance(0.3) else m.coloured("bin", 0.5)
+    formed(m, "bin_of", form, r=r, t=tall, of=material)
     match form:
         case 0 | 1:  # for paper
             m.vessel([(0, 0), (r * 0.85, 0), (r, tall)], 0.003, n=20 if form == 0 else 28,
@@ -44,15 +46,9 @@ def bin_of(m: Maker, form: int, r: float, tall: float) -> None:
         case 3 | 4:
             pedal_bin(m, r, tall, form, material)
         case 5:  # a lid that swings
-            m.loft(rings(rect, [(1.7 * r, 1.4 * r, 0.03, 0), (1.9 * r, 1.6 * r, 0.04, tall * 1.2)]),
-                of=material)
             m.loft(rings(rect, [(1.95 * r, 1.65 * r, 0.04, tall * 1.2 + 0.0002),
                 (1.95 * r, 1.65 * r, 0.04, tall * 1.25), (1.5 * r, 1.2 * r, 0.03, tall * 1.42)]),
                 of=m.coloured("lid", 0.5))
-        case 6:  # square
-            m.loft(rings(rect, [(1.7 * r, 1.2 * r, 0.02, 0), (2 * r, 1.5 * r, 0.02, tall),
-                (2 * r - 0.008, 1.5 * r - 0.008, 0.018, tall), (1.7 * r - 0.006, 1.2 * r - 0.006,
-                0.018, 0.005)], n=3), of=material)
         case 7:  # of wicker
             rope_side(m, 2 * r, 2 * r, 0.1, tall, 8, plain("wicker",
                 mix((0.66, 0.52, 0.36), m.any_colour(), m.pick(0.0, 0.3)), 0.9))
@@ -67,8 +63,6 @@ def bin_of(m: Maker, form: int, r: float, tall: float) -> None:
         case 9:
             sorting_bins(m, tall)
         case 10:  # a lid that opens by a touch, over a tall square body
-            m.loft(rings(rect, [(1.8 * r, 1.5 * r, 0.02, 0), (1.8 * r, 1.5 * r, 0.02, tall * 1.3)],
-                n=3), of=material)
             m.loft(rings(rect, [(1.82 * r, 1.52 * r, 0.02, tall * 1.3 + 0.0002),
                 (1.82 * r, 1.52 * r, 0.02, tall * 1.36), (1.7 * r, 1.4 * r, 0.02, tall * 1.38)],
                 n=3), of=plain("lid", m.pick((0.1, 0.1, 0.1), (0.9, 0.9, 0.88)), 0.4))
@@ -83,8 +77,6 @@ def bin_of(m: Maker, form: int, r: float, tall: float) -> None:
                 for y in (0.1, 0.9):
                     m.hoop(oval(1.8 * r, 1.8 * r, n=20), y * tall, 0.006, n=5)
         case 13:  # a bucket with a handle
-            m.vessel([(0, 0), (r * 0.7, 0), (r * 0.96, tall * 0.92), (r, tall * 0.92), (r, tall)],
-                0.003, n=26, of=material)
             m.tube(bent([(-r, tall * 0.94, 0), (-0.8 * r, tall * 1.3, 0), (0.8 * r, tall * 1.3, 0),
                 (r, tall * 0.94, 0)], 0.1, n=5), 0.004, n=6, of=m.metal)
         case 14:  # a ball's form with a hole

@@ -6,8 +6,9 @@ from numpy import cos, pi, sin
 
 from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.furnishings.things.food import apple
+from pbrs_farm.furnishings.things.forms import formed
 from pbrs_farm.furnishings.things.maker import Maker, thing
-from pbrs_farm.geometry.outlines import bent, fluted, oval, polar, rect, rings, scaled
+from pbrs_farm.geometry.outlines import bent, fluted, oval, polar, rings, scaled
 
 
 # fmt: off
@@ -18,38 +19,18 @@ def bowl(m: Maker) -> None:
     tall = r * m.uniform(0.45, 0.7)
     material = plain("wood bowl", m.wood, 0.4) if m.chance(0.3) else m.china()
     with m.of(material):
+        formed(m, "bowl", form, r=r, t=tall)
         match form:
-            case 0 | 1:  # on a low foot
-                m.vessel([(0, 0), (r * 0.45, 0), (r * 0.47, 0.006), (r * 0.78, tall * 0.45),
-                    (r, tall)], 0.005, n=20)
-            case 2:  # on a stem
-                m.vessel([(0, 0), (r * 0.5, 0), (r * 0.45, 0.01), (r * 0.14, 0.03),
-                    (r * 0.14, 0.4 * tall + 0.02), (r * 0.6, 0.6 * tall + 0.03), (r, tall + 0.04)],
-                    0.005, n=22)
-            case 3:  # square
-                m.loft(rings(rect, [(1.1 * r, 1.1 * r, 0.02, 0), (2 * r, 2 * r, 0.03, tall),
-                    (2 * r - 0.012, 2 * r - 0.012, 0.026, tall), (1.1 * r, 1.1 * r, 0.02, 0.008)],
-                    n=3))
             case 4:  # fluted
                 k = m.integers(8, 15)
                 m.loft(rings(fluted, [(1.0 * r, k, 0.05, 0), (1.6 * r, k, 0.08, tall * 0.45),
                     (2 * r, k, 0.1, tall), (2 * r - 0.01, k, 0.1, tall),
                     (1.5 * r, k, 0.08, tall * 0.45), (0.9 * r, k, 0.05, 0.008)]), sharp=70.0)
-            case 5:  # shallow
-                m.vessel([(0, 0), (r * 0.7, 0), (r * 1.1, 0.02), (r * 1.3, 0.045)], 0.004, n=26)
-            case 6:  # oval
-                m.loft(rings(oval, [(1.2 * r, 0.8 * r, 0), (2.3 * r, 1.5 * r, tall * 0.6),
-                    (2.6 * r, 1.7 * r, tall), (2.6 * r - 0.012, 1.7 * r - 0.012, tall),
-                    (2.2 * r, 1.4 * r, tall * 0.6), (1.1 * r, 0.7 * r, 0.008)], n=22))
             case 7:  # some in each other
                 for k in range(m.integers(2, 5)):
                     m.vessel([(0, 0), (r * 0.42, 0), (r * 0.44, 0.006), (r * 0.7, tall * 0.45),
                         (r * 0.82, tall * 0.8)], 0.004, at=(0, 0.018 * k, 0))
-            case 9:  # drawn in at its rim
-                m.vessel(scaled(r, tall, [(0, 0), (0.6, 0), (0.95, 0.3), (1, 0.65), (0.8, 1)]),
-                    0.006, n=22)
             case 10:  # two grips
-                m.vessel(scaled(r, tall, [(0, 0), (0.5, 0), (0.85, 0.4), (1, 1)]), 0.006, n=20)
                 for x in (-1.0, 1.0):
                     m.tube(bent([(x * r * 0.97, tall * 0.92, -0.03),
                         (x * (r + 0.03), tall * 0.95, -0.025), (x * (r + 0.03), tall * 0.95, 0.025),
@@ -85,32 +66,12 @@ def plant_pot(m: Maker) -> None:
     material, soil = (plain("pot", (0.66, 0.36, 0.24) if m.chance(0.4) else m.any_colour(), 0.8),
         plain("earth", (0.16, 0.11, 0.08), 0.95))
     with m.of(material):
+        formed(m, "plant_pot", form, r=r, t=tall)
         match form:
-            case 0:  # tapered
-                m.vessel([(0, 0), (r * 0.72, 0), (r, tall)], 0.006, n=20)
-            case 1:  # with a rim
-                m.vessel(scaled(r, tall, [(0, 0), (0.7, 0), (0.9, 0.75), (0.98, 0.75), (1, 1)]),
-                    0.006, n=20)
-            case 2:  # straight
-                m.vessel([(0, 0), (r * 0.93, 0), (r, 0.008), (r, tall)], 0.005, n=24)
-            case 3:  # square
-                m.loft(rings(rect, [(1.5 * r, 1.5 * r, 0.008, 0), (1.9 * r, 1.9 * r, 0.01, tall),
-                    (1.9 * r - 0.014, 1.9 * r - 0.014, 0.008, tall),
-                    (1.5 * r - 0.01, 1.5 * r - 0.01, 0.006, 0.01)], n=2))
-            case 4:  # on a saucer
-                m.vessel([(0, 0.0102), (r * 0.68, 0.0102), (r * 0.95, tall)], 0.006, n=20)
-                m.turned([(r * 0.8, 0), (r, 0.018), (r * 0.97, 0.02), (r * 0.8, 0.01)], n=22)
             case 5:  # on three legs
-                m.vessel([(0, 0.08), (r * 0.9, 0.08), (r, 0.09), (r, 0.08 + tall)], 0.005, n=24)
                 for k in range(3):
                     m.tube([polar(r * 1.0, 0, 2.1 * k), polar(r * 0.75, 0.1, 2.1 * k)], 0.008, n=7,
                         of=plain("leg wood", m.wood, 0.5))
-            case 6:  # ribbed
-                m.loft(rings(fluted, [(1.5 * r, 14, 0.06, 0), (2 * r, 14, 0.06, tall),
-                    (2 * r - 0.014, 14, 0.06, tall), (1.45 * r, 14, 0.06, 0.01)]), sharp=70.0)
-            case 7:  # round
-                m.vessel(scaled(r, tall, [(0, 0), (0.5, 0), (1.05, 0.35), (1.1, 0.55), (0.9, 0.8)]),
-                    0.006, n=22)
             case 8:  # of zinc, two grips
                 m.vessel(scaled(r, tall, [(0, 0), (0.75, 0), (0.97, 0.95), (1.02, 0.95),
                     (1.02, 1)]), 0.003, n=22, of=m.metal)

@@ -12,6 +12,7 @@ from pbrs_farm.core.frames import rotation_x, rotation_y
 from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import Rgb, mix, shade
 from pbrs_farm.dress.thing_materials import plain
+from pbrs_farm.furnishings.things.forms import formed
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.shapes import row
 from pbrs_farm.geometry.outlines import bent, oval, polar, rect, ring_path, rings, scaled
@@ -189,10 +190,8 @@ def basket(m: Maker) -> None:
     """
     form, tall, r = m.integers(0, 8), m.uniform(0.18, 0.3), m.uniform(0.14, 0.2)
     weave = plain("wicker", mix((0.62, 0.47, 0.3), m.any_colour(), m.pick(0.0, 0.2, 0.7)), 0.9)
+    formed(m, "basket", form, r=r, t=tall, of=weave)
     match form:
-        case 0:  # round
-            m.vessel(scaled(r, tall, [(0, 0), (0.85, 0), (0.95, 0.3), (1, 0.7), (0.98, 1)]), 0.01,
-                n=20, of=weave)
         case 1 | 2 | 3:  # of rope
             rope_side(m, 2 * r, (2 if form != 2 else 1.4) * r, 0.1, tall, 7, weave)
             if form != 3:
@@ -201,20 +200,16 @@ def basket(m: Maker) -> None:
                         (x * r * 0.97, tall * 1.25, -0.05), (x * r * 0.97, tall * 1.25, 0.05),
                         (x * r * 0.93, tall * 0.85, 0.06)], 0.03, n=3), 0.008, n=6, of=weave)
         case 4:  # firewood
-            m.vessel(scaled(r, tall, [(0, 0), (0.9, 0), (1, 0.6), (1.02, 1)]), 0.01, n=20, of=weave)
             for k in range(6):
                 m.tube([((k % 3 - 1) * 0.5 * r, 0.03 + 0.012 * k, (k // 3 - 0.5) * 0.5 * r),
                     ((k % 3 - 1) * 0.62 * r, tall * m.uniform(1.1, 1.5), (k // 3 - 0.5) * 0.7 * r)],
                     m.uniform(0.02, 0.034), n=7, of=plain("log", shade((0.45, 0.32, 0.2),
                     m.uniform(0.7, 1.3)), 0.9))
         case 5:  # wool and needles, or rolled blankets
-            m.vessel(scaled(r, tall, [(0, 0), (0.8, 0), (1, 0.5), (0.95, 0.8)]), 0.01, n=20,
-                of=weave)
             for k in range(3):
                 m.sphere(polar(0.45 * r, tall * 0.62, 2.1 * k), 0.42 * r, n=12,
                     of=m.coloured("wool", 0.95))
         case 6:  # rolled blankets
-            m.vessel([(0, 0), (r * 0.95, 0), (r, tall)], 0.01, n=20, of=weave)
             for k in range(3):
                 m.tube([polar(0.45 * r, 0.014, 2.1 * k), (0.5 * r * cos(2.1 * k),
                     tall * m.uniform(1.2, 1.6), 0.5 * r * sin(2.1 * k))], 0.36 * r, n=12,

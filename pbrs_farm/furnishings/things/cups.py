@@ -8,6 +8,7 @@ from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import Surface
 from pbrs_farm.dress import thing_materials as materials
 from pbrs_farm.dress.thing_materials import plain
+from pbrs_farm.furnishings.things.forms import formed
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.geometry.bodies import smooth
 from pbrs_farm.geometry.outlines import bent, oval, rings
@@ -20,6 +21,7 @@ def cup(m: Maker) -> None:
     form, tall, r, glaze = (m.integers(0, 13), m.uniform(0.078, 0.102), m.uniform(0.036, 0.044),
         m.china())
     with m.of(glaze):
+        formed(m, "cup", form, r=r, t=tall)
         match form:
             case 0 | 1:  # a mug
                 foot = r * m.uniform(0.65, 1.0)
@@ -31,25 +33,18 @@ def cup(m: Maker) -> None:
                         (0.94 * r, tall)])], 0.003, of=glaze)
                 m.add(handle(0.97 * r, tall))
             case 2:  # a tea cup on its saucer
-                m.vessel([(0, 0.0122), (r * 0.6, 0.0122), (r * 0.7, 0.018), (r * 1.05, 0.045),
-                    (r * 1.15, 0.068)], 0.0025, n=20)
                 m.tube(bent([(r * 1.0, 0.058, 0), (r * 1.6, 0.06, 0), (r * 1.5, 0.03, 0),
                     (r * 0.85, 0.028, 0)], 0.015, n=3), 0.003, n=6)
                 m.turned([(0.04, 0), (0.075, 0.011), (0.074, 0.0125), (0.04, 0.006), (0.03, 0.012)],
                     n=24)
             case 3:  # for espresso, on its saucer
-                m.vessel([(0, 0.0082), (0.02, 0.0082), (0.027, 0.02), (0.029, 0.06)], 0.003, n=18)
                 m.tube(bent([(0.027, 0.052, 0), (0.047, 0.054, 0), (0.045, 0.026, 0),
                     (0.026, 0.026, 0)], 0.012, n=3), 0.003, n=6)
                 m.revolve([(0, 0), (0.03, 0), (0.055, 0.008), (0.054, 0.0095), (0.03, 0.005),
                     (0, 0.008)], n=22)
             case 4:  # a tall one
-                m.vessel([(0, 0), (0.028, 0), (0.034, 0.02), (0.04, 0.13)], 0.003, n=18)
                 m.tube(bent([(0.037, 0.11, 0), (0.068, 0.11, 0), (0.066, 0.035, 0),
                     (0.034, 0.035, 0)], 0.02, n=3), 0.004, n=6)
-            case 5:  # a bowl without a handle
-                m.vessel([(0, 0), (0.03, 0), (0.035, 0.008), (0.055, 0.04), (0.062, 0.075)], 0.0035,
-                    n=22)
             case 7:  # facets
                 k = m.integers(6, 10)
                 m.loft(rings(oval, [(1.6 * r, 1.6 * r, 0), (2 * r, 2 * r, 0.03),
@@ -57,12 +52,8 @@ def cup(m: Maker) -> None:
                     (2 * r - 0.01, 2 * r - 0.01, 0.008)], n=k), sharp=20.0)
                 m.add(handle(0.92 * r, tall))
             case 8:  # round
-                m.vessel([(0, 0), (r * 0.7, 0), (r * 1.15, 0.025), (r * 1.2, 0.05),
-                    (r * 0.95, 0.082), (r * 1.0, 0.09)], 0.003, n=20)
                 m.add(handle(r * 1.12, 0.09))
             case 9:  # a groove, an angular handle
-                m.vessel([(0, 0), (r, 0), (r, 0.02), (r * 0.97, 0.022), (r * 0.97, 0.03),
-                    (r, 0.032), (r, tall)], 0.003, n=18)
                 m.tube(bent([(r - 0.002, tall * 0.85, 0), (r + 0.03, tall * 0.85, 0),
                     (r + 0.03, tall * 0.3, 0), (r - 0.002, tall * 0.3, 0)], 0.006, n=2), 0.0045,
                     n=6)

@@ -10,10 +10,11 @@ from pbrs_farm.core.frames import rotation_x, rotation_y
 from pbrs_farm.dress import thing_materials as materials
 from pbrs_farm.dress.thing_materials import plain
 from pbrs_farm.furnishings.things.cups import handle
+from pbrs_farm.furnishings.things.forms import formed
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.furnishings.things.profiles import profiles
 from pbrs_farm.geometry.bodies import bevelled, vessel
-from pbrs_farm.geometry.outlines import Profile, bent, fluted, oval, rings
+from pbrs_farm.geometry.outlines import Profile, bent, oval, rings
 
 # fmt: off
 _WALL_M: Final = 0.002
@@ -105,15 +106,7 @@ def _tumbler(m: Maker) -> None:
 def _mug(m: Maker) -> None:
     """A beer mug with a handle: plain, a barrel, or with facets."""
     r, tall, form = m.uniform(0.036, 0.042), m.uniform(0.11, 0.15), m.integers(0, 3)
-    match form:
-        case 0:
-            m.vessel([(0, 0), (r, 0), (1.02 * r, tall)], 0.004, n=18)
-        case 1:
-            m.vessel([(0, 0), (0.9 * r, 0), (1.05 * r, 0.4 * tall), (1.05 * r, 0.65 * tall),
-                (0.95 * r, tall)], 0.004, n=18)
-        case 2:
-            m.loft(rings(fluted, [(2 * r, 9, 0.1, 0.0), (2.05 * r, 9, 0.1, tall),
-                (1.8 * r, 9, 0.06, tall), (1.76 * r, 9, 0.06, 0.012)]), sharp=70.0)
+    formed(m, "mug", form, r=r, t=tall)
     if m.chance(0.5):
         m.tube(bent([(r - 0.003, 0.86 * tall, 0), (r + 0.038, 0.86 * tall, 0),
             (r + 0.036, 0.2 * tall, 0), (r - 0.003, 0.2 * tall, 0)], 0.02, n=3), 0.005, n=6)

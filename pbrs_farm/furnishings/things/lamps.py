@@ -21,9 +21,10 @@ from pbrs_farm.dress.thing_materials import (
     plain,
 )
 from pbrs_farm.furnishings.things.catalogued import catalogued
+from pbrs_farm.furnishings.things.forms import formed
 from pbrs_farm.furnishings.things.maker import Maker, Size
 from pbrs_farm.furnishings.things.parameters import Choice, Range
-from pbrs_farm.geometry.outlines import bent, d_shape, fluted, oval, polar, rect, rings, scaled
+from pbrs_farm.geometry.outlines import bent, d_shape, oval, polar, rings
 
 
 # fmt: off
@@ -196,29 +197,16 @@ def shade_lamp(m: Maker, size: Size, p: TableLamp) -> None:
 
 def lamp_foot(m: Maker, kind: str, q: float, f: float) -> None:
     """The foot of a table lamp, of radius q and height f."""
+    formed(m, "lamp_foot", kind, f=f, q=q)
     match kind:
-        case "turned":
-            m.revolve(scaled(q, f, [(0, 0), (0.8, 0), (1, 0.2), (0.9, 0.5), (0.35, 0.85), (0.2, 1),
-                (0, 1)]), n=24)
         case "ball":
             m.sphere((0.0, q, 0.0), q, n=18)
-        case "rod":
-            m.turned([(q, 0.0), (q, 0.015), (0.012, 0.03), (0.01, f)], n=24)
-        case "block":
-            m.loft(rings(rect, [(q * 1.5, q * 1.5, 0.006, 0.0), (q * 1.5, q * 1.5, 0.006, 0.75 * f),
-                (q * 0.5, q * 0.5, 0.006, 0.85 * f)], n=2))
         case "balls":
             for k in range(3):
                 m.sphere((0.0, q * (0.75 + 1.15 * k * 0.8), 0.0), q * (0.75 - 0.12 * k), n=14)
         case "tripod":
             for k in range(3):
                 m.tube([polar(q, 0.004, 2.0944 * k), polar(0.01, f, 2.0944 * k)], 0.008, n=7)
-        case "fluted":
-            m.loft(rings(fluted, [(1.6 * q, 12, 0.08, 0.0), (2 * q, 12, 0.08, 0.4 * f),
-                (1.1 * q, 12, 0.08, 0.85 * f), (0.6 * q, 12, 0.08, 0.9 * f)]), sharp=70.0)
-        case "baluster":
-            m.turned([(q, 0.0), (q, 0.02), (q * 0.4, 0.06), (q * 0.55, 0.3 * f), (q * 0.3, 0.5 * f),
-                (q * 0.5, 0.7 * f), (q * 0.2, 0.9 * f), (q * 0.2, f)], n=20)
 
 
 @catalogued()

@@ -8,9 +8,10 @@ from numpy import pi
 from pbrs_farm.core.frames import rotation_x
 from pbrs_farm.core.house import Surface
 from pbrs_farm.dress.thing_materials import glass, plain
+from pbrs_farm.furnishings.things.forms import formed
 from pbrs_farm.furnishings.things.maker import Maker, thing
 from pbrs_farm.geometry.bodies import vessel
-from pbrs_farm.geometry.outlines import bent, fluted, oval, polar, rect, ring_path, rings, scaled
+from pbrs_farm.geometry.outlines import bent, fluted, oval, polar, ring_path, rings
 
 
 # fmt: off
@@ -20,25 +21,11 @@ def vase(m: Maker) -> None:
     form, tall, r = m.integers(0, 16), m.uniform(0.15, 0.33), m.uniform(0.045, 0.08)
     material = glass((0.8, 0.9, 0.88), 0.2) if m.chance(0.15) else m.china()
     with m.of(material):
+        formed(m, "vase", form, r=r, t=tall)
         match form:
             case 0:  # a drawn-in waist
                 m.add(smoothed_vessel(r, r * m.uniform(0.3, 0.8), r * m.uniform(0.35, 0.9),
                     m.uniform(0.25, 0.6), tall))
-            case 1:  # a bottle: straight, a thin neck
-                m.vessel(scaled(r, tall, [(0, 0), (0.8, 0), (1, 0.08), (1, 0.45), (0.7, 0.56),
-                    (0.3, 0.64), (0.26, 0.94), (0.36, 1)]), 0.004, n=18)
-            case 2:  # a round belly, a short wide neck
-                m.vessel(scaled(r, tall, [(0, 0), (0.5, 0), (0.95, 0.16), (1.15, 0.36), (1.1, 0.52),
-                    (0.7, 0.68), (0.45, 0.72), (0.5, 0.76)]), 0.004, n=22)
-            case 3:  # straight
-                m.vessel([(0, 0), (r * 0.75, 0), (r * 0.78, 0.006), (r * 0.78, tall)], 0.005, n=26)
-            case 4:  # square
-                m.loft(rings(rect, [(1.5 * r, 1.5 * r, 0.012, 0), (1.6 * r, 1.6 * r, 0.012, 0.005),
-                    (1.6 * r, 1.6 * r, 0.012, tall), (1.6 * r - 0.01, 1.6 * r - 0.01, 0.009, tall),
-                    (1.6 * r - 0.012, 1.6 * r - 0.012, 0.009, 0.01)], n=2))
-            case 5:  # a gourd: two bellies
-                m.vessel(scaled(r, tall, [(0, 0), (0.6, 0), (1, 0.14), (1, 0.3), (0.55, 0.48),
-                    (0.5, 0.54), (0.72, 0.68), (0.68, 0.8), (0.3, 0.93), (0.36, 1)]), 0.004)
             case 6:  # fluted
                 k = m.integers(9, 16)
                 m.loft(rings(fluted, [(1.4 * r, k, 0.06, 0), (1.7 * r, k, 0.06, 0.12 * tall),
@@ -46,34 +33,17 @@ def vase(m: Maker) -> None:
                     (1.5 * r, k, 0.06, tall), (1.5 * r - 0.01, k, 0.06, tall - 0.001),
                     (1.25 * r, k, 0.06, 0.8 * tall)]), sharp=70.0)
             case 7:  # an amphora with two handles
-                m.vessel([(0, 0), (r * 0.5, 0), (r * 0.55, 0.01), (r, 0.4 * tall),
-                    (r * 0.95, 0.58 * tall), (r * 0.45, 0.76 * tall), (r * 0.4, 0.93 * tall),
-                    (r * 0.52, tall)], 0.004, n=18)
                 for s in (-1.0, 1.0):
                     m.tube(bent([(s * r * 0.4, 0.9 * tall, 0.0), (s * r * 1.15, 0.9 * tall, 0.0),
                         (s * r * 0.9, 0.58 * tall, 0.0)], 0.03, n=4), 0.006, n=6)
-            case 8:  # a trumpet on a foot
-                m.vessel([(0, 0), (r * 0.75, 0), (r * 0.75, 0.008), (r * 0.3, 0.05 * tall),
-                    (r * 0.28, 0.4 * tall), (r * 0.42, 0.7 * tall), (r * 0.95, tall)], 0.003, n=20)
             case 9:  # facets
                 k = m.integers(5, 9)
                 m.loft(rings(oval, [(1.2 * r, 1.2 * r, 0), (2.1 * r, 2.1 * r, 0.4 * tall),
                     (1.2 * r, 1.2 * r, tall), (1.2 * r - 0.012, 1.2 * r - 0.012, tall),
                     (1.6 * r, 1.6 * r, 0.4 * tall)], n=k), sharp=15.0)
             case 10:  # a jug
-                m.vessel(scaled(r, tall, [(0, 0), (0.7, 0), (0.95, 0.2), (0.9, 0.45), (0.5, 0.72),
-                    (0.5, 0.85), (0.62, 1)]), 0.004, n=20)
                 m.tube(bent([(r * 0.45, 0.88 * tall, 0.0), (r * 1.35, 0.9 * tall, 0.0),
                     (r * 1.25, 0.35 * tall, 0.0), (r * 0.8, 0.3 * tall, 0.0)], 0.04, n=4), 0.008)
-            case 11:  # a jar with its lid
-                m.turned([(r * 0.7, 0), (r * 0.75, 0.01), (r, 0.4 * tall), (r * 1.05, 0.6 * tall),
-                    (r * 0.8, 0.76 * tall), (r * 0.5, 0.8 * tall)], n=22)
-                m.revolve(scaled(r, tall, [(0, 0.8002), (0.58, 0.8002), (0.6, 0.84), (0.3, 0.92),
-                    (0.12, 0.94), (0.14, 0.98), (0, 1)]), n=22)
-            case 12:  # three bellies one above another
-                m.vessel(scaled(r, tall, [(0, 0), (0.5, 0), (0.9, 0.1), (0.9, 0.22), (0.5, 0.32),
-                    (0.8, 0.42), (0.8, 0.54), (0.45, 0.64), (0.65, 0.74), (0.6, 0.86), (0.3, 0.95),
-                    (0.35, 1)]), 0.003)
             case 13:  # a ring on a foot, its neck on top
                 a = 0.36 * tall
                 m.tube(ring_path(a, n=24), 0.028, n=10, turn=rotation_x(pi / 2),
@@ -81,15 +51,6 @@ def vase(m: Maker) -> None:
                 m.turned([(0.045, 0), (0.042, 0.012), (0.02, 0.03)], n=18)
                 m.vessel([(0, 0), (0.02, 0), (0.016, 0.03), (0.024, 0.06)], 0.003,
                     at=(0.0, 2 * a + 0.05, 0.0))
-            case 14:  # flat, as a pillow
-                m.loft(rings(oval, [(2.2 * r, 1.0 * r, 0), (2.5 * r, 1.2 * r, 0.1 * tall),
-                    (2.3 * r, 1.1 * r, 0.7 * tall), (1.3 * r, 0.7 * r, 0.95 * tall),
-                    (1.4 * r, 0.75 * r, tall), (1.25 * r, 0.6 * r, tall - 0.002),
-                    (1.8 * r, 0.8 * r, 0.7 * tall)], n=20))
-            case 15:  # a groove round its middle
-                m.vessel([(0, 0), (r * 0.8, 0), (r * 0.95, 0.012), (r * 0.95, 0.3 * tall),
-                    (r * 0.9, 0.32 * tall), (r * 0.95, 0.34 * tall), (r * 0.95, 0.6 * tall),
-                    (r * 0.5, 0.75 * tall), (r * 0.5, 0.8 * tall)], 0.004, n=18)
     if form in (1, 3, 8, 15) and m.chance(0.5):
         dry_twigs(m, tall)
 
