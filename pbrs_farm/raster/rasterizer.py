@@ -50,7 +50,8 @@ SKY_SRGB = (0.78, 0.87, 0.96)  # background: behind windows and beyond the house
 class Rasterizer:
     """One house in one OpenGL context; close() it, or use it in a with statement.
 
-    textures: texture id -> (H, W, 3 or 4) uint8 sRGB, row 0 = top; a missing one is drawn without.
+    textures: texture id -> (H, W, 3 or 4) uint8 sRGB, row 0 = top, each looked up when it is first drawn; a missing
+    one is drawn without.
     Raises MachineFailed when this machine has no EGL.
     """
 
@@ -99,8 +100,8 @@ class Rasterizer:
         name = self._house.materials[material].texture_id or ""
         name = name if name in self._pictures else ""
         if name not in self._textures:
-            # A material without a texture samples a white texel.
-            pixels = self._pictures[name] if name else np.full((1, 1, 3), 255, np.uint8)
+            # A material without a texture, or with an unreadable one, samples a white texel.
+            pixels = self._pictures.get(name, np.full((1, 1, 3), 255, np.uint8))
             repeats = (name, 0) in self._repeating, (name, 1) in self._repeating
             self._textures[name] = texture_from_pixels(self._context, pixels, repeats)
         return self._textures[name]

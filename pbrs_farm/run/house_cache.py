@@ -7,11 +7,11 @@ from __future__ import annotations
 
 import gc
 from collections import OrderedDict
-from collections.abc import Container, Mapping
+from collections.abc import Container, Iterator, Mapping
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import TYPE_CHECKING, Any, Final
+from typing import TYPE_CHECKING, Final
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,7 +20,7 @@ from pbrs_farm.assets.skies import fetch_skies
 from pbrs_farm.core import keys
 from pbrs_farm.core.camera import View
 from pbrs_farm.core.errors import BadInput, BadRecipe
-from pbrs_farm.core.house import Geometry, House, geometry_from_house
+from pbrs_farm.core.house import Geometry, House, Texture, geometry_from_house
 from pbrs_farm.core.recipe import Recipe
 from pbrs_farm.formats.cameras_json import views_from_json
 from pbrs_farm.geometry.moving import MovingHouse
@@ -108,8 +108,7 @@ class CachedHouse:
         """The GL renderer, with a GL context of this thread: use and close it in the thread that asked first."""
         from pbrs_farm.raster import Rasterizer
 
-        colours = {m.texture_id for m in self.house.materials}
-        return Rasterizer(self.house, self._textures_once(colours), self.recipe.raster)
+        return Rasterizer(self.house, DecodedOnDemand(self.house.textures), self.recipe.raster)
 
     def rasterizer_at(self, time_s: float | None) -> Rasterizer:
         """The GL renderer of the house at a time; the same object for all times."""
@@ -184,18 +183,33 @@ def decoded_textures(
 
     names: ids of the wanted ones; None = all.
     """
-    from pbrs_farm.images import decode_texture
+    pictures = DecodedOnDemand(house.textures)
+    chosen = [name for name in pictures if names is None or name in names]
+    tried = {name: pictures.get(name) for name in chosen}
+    decoded = {name: picture for name, picture in tried.items() if picture is not None}
+    return decoded, [name for name in tried if name not in decoded]
 
-    decoded: dict[str, Any] = {}
-    unreadable = []
-    for texture in house.textures.values():
-        if names is not None and texture.id not in names:
-            continue
+
+class DecodedOnDemand(Mapping[str, NDArray[np.uint8]]):
+    """Pictures by texture id as of `decoded_textures`, decoded at each look-up, where an unreadable one is missing."""
+
+    def __init__(self, textures: Mapping[str, Texture]) -> None:
+        self._textures = textures
+
+    def __getitem__(self, name: str) -> NDArray[np.uint8]:
+        from pbrs_farm.images import decode_texture
+
+        texture = self._textures[name]
         try:
-            decoded[texture.id] = decode_texture(texture.data, texture.name, texture.media_type)
+            return decode_texture(texture.data, texture.name, texture.media_type)
         except BadInput:
-            unreadable.append(texture.id)
-    return decoded, unreadable
+            raise KeyError(name) from None
+
+    def __iter__(self) -> Iterator[str]:
+        return iter(self._textures)
+
+    def __len__(self) -> int:
+        return len(self._textures)
 
 
 class HouseCache:

@@ -126,8 +126,8 @@ def _run_step(send: Send, setting: Setting, name: str, work: Work) -> bool:
         traceback.print_exc()
         sys.stderr.flush()
     else:
-        if name == "house":
-            give_back_memory()  # of painting and repair, before scenes are built
+        if not plan.STEPS[name].per_view:
+            _give_back_memory()  # of painting, repair and candidate views, before scenes are built
         seconds = time.perf_counter() - started
         send(Message("event", body=asdict(_event_of_outcome(work, name, outcome, seconds))))
         return True
@@ -135,6 +135,13 @@ def _run_step(send: Send, setting: Setting, name: str, work: Work) -> bool:
     failed = Event(kind, work.house_id, work.view_id, name, message=message)
     send(Message("event", body=asdict(failed)))
     return False
+
+
+def _give_back_memory() -> None:
+    """Return the free memory of Dr.Jit, if it is loaded, and of this process to the system."""
+    if drjit := sys.modules.get("drjit"):
+        drjit.flush_malloc_cache()
+    give_back_memory()
 
 
 def _facts_for_run(step: str, facts: dict[str, Any]) -> dict[str, Any]:

@@ -5,9 +5,10 @@ Effects: holds Mitsuba scenes and device buffers of the process's variant.
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
+from itertools import chain
 from typing import TYPE_CHECKING, Any, Final
 
 import numpy as np
@@ -35,6 +36,8 @@ if TYPE_CHECKING:
     from pbrs_farm.transport.kernels.emitters import Emitters, EmitterWeights
     from pbrs_farm.transport.sample_passes import SampledView
     from pbrs_farm.transport.view_emitters import ViewEmitters
+
+Pictures = dict[str, NDArray[np.uint8]]
 
 _FLOOR_POINTS: Final = 256  # a room, for its mean illuminance
 
@@ -94,7 +97,7 @@ class LightScene:
             if panes is not None and variant.startswith("llvm"):
                 self.device_scene.panes = Panes(panes)
             # The device has the texels, most of the tables' bytes.
-            self.tables = replace(tables, texels=tables.texels[:1].copy())
+            self.tables = replace(tables, texels=np.zeros(1, np.uint32))
         self._portals = portals
         self._moving = moving  # the home and its panes; None where nothing moves
         self._panes = panes
@@ -105,7 +108,7 @@ class LightScene:
     @staticmethod
     def load(
         house: House,
-        textures: dict[str, NDArray[np.uint8]] | Callable[[], dict[str, NDArray[np.uint8]]],
+        textures: Pictures | Callable[[Collection[str | None]], Pictures],
         recipe: Recipe,
         sky: Sky,
         *,
@@ -113,26 +116,33 @@ class LightScene:
     ) -> LightScene:
         """The scene of a repaired house; its window panes only mirror what rays from the camera show.
 
-        textures: id -> (H, W, 3 or 4) uint8 sRGB, row 0 at the top, or a function that decodes them, so
+        textures: id -> (H, W, 3 or 4) uint8 sRGB, row 0 at the top, or a function that decodes some, so
         that nobody holds them longer than needed. Raises BadHouse when there is no surface and MachineFailed
         when Mitsuba does not work here.
         """
         name = choose_variant() if variant is None else variant
         mitsuba(name)
         inside = house.with_items(i for i in house.items if not i.is_outside)
-        shown = {p for m in _materials_of(inside) for p in (m.texture_id, *map_key(m)[:2])}
-        pictures = textures() if callable(textures) else textures
-        used = {name: texture for name, texture in pictures.items() if name in shown}
-        tables = tables_from_house(inside, used, recipe)
+
+        def tables_of(some: House, names: Collection[str | None]) -> SceneTables:
+            pictures = textures(names) if callable(textures) else textures
+            pictures = {k: picture for k, picture in pictures.items() if k in names}
+            tables = tables_from_house(some, pictures, recipe)
+            if name.startswith("scalar"):
+                return tables
+            from pbrs_farm.transport.kernels.device_scene import with_device_texels
+
+            del pictures
+            return with_device_texels(tables)
+
+        maps = ((m.texture_id, *map_key(m)[:2]) for m in _materials_of(inside))
+        tables = tables_of(inside, set(chain.from_iterable(maps)))
         outside = None
         if len(inside.items) < len(house.items):
             beyond = house.with_items(i for i in house.items if i.is_outside)
-            shown = {m.texture_id for m in _materials_of(beyond)}
-            used = {name: texture for name, texture in pictures.items() if name in shown}
-            outside = beyond, tables_from_house(beyond, used, recipe)
-        del pictures, used
+            outside = beyond, tables_of(beyond, {m.texture_id for m in _materials_of(beyond)})
         glass = None if recipe.materials.preset == "released" else panes_of_house(inside)
-        panes = None if glass is None else tables_from_house(glass, {}, recipe)
+        panes = None if glass is None else tables_of(glass, ())
         moving = None
         if inside.motions:
             panes_then = None if glass is None else MovingHouse.of(glass, with_panes=False)

@@ -96,6 +96,24 @@ def test_only_a_repeating_texture_mixes_its_ends_at_the_border(copies, is_mixed)
     assert (row[0] < row[1] - 5) == is_mixed
 
 
+def test_only_visible_textures_are_looked_up_and_a_missing_one_is_white():
+    class Pictures(dict):
+        def __contains__(self, name):
+            return name in ("unreadable", "behind")
+
+        def get(self, name, default=None):
+            assert name != "behind"
+            return default
+
+    shown, hidden = (Material(name, texture_id=name) for name in ("unreadable", "behind"))
+    scene = house((item(square(-2.0, 0)), item(square(20.0, 1))), (shown, hidden))
+    with Rasterizer(scene, Pictures()) as raster:
+        textured = raster.render_dl(camera())
+    plain = house((item(square(-2.0, 0)),), (replace(shown, texture_id=None),))
+    with Rasterizer(plain, {}) as raster:
+        assert (raster.render_dl(camera()) == textured).all()
+
+
 def test_a_cut_out_texture_shows_what_lies_behind():
     pixels = np.full((8, 8, 4), 255, np.uint8)
     pixels[..., 3] = 0

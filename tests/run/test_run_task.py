@@ -12,7 +12,7 @@ from pbrs_farm.run.processes.child_process import Message
 from pbrs_farm.run.processes.render_task import RenderTask, Setting
 
 
-def test_memory_is_given_back_once_a_house_is_made(
+def test_memory_is_given_back_after_each_step_of_a_house(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
     lines: list[str] = []
@@ -27,4 +27,11 @@ def test_memory_is_given_back_once_a_house_is_made(
 
     task = RenderTask(source.house_id, ("house", "cameras"), source)
     run_task.run_task(hear, setting, HouseCache(), task)
-    assert lines == ["step house", "given back", "event house", "step cameras", "event cameras"]
+    assert lines == [
+        "step house",
+        "given back",
+        "event house",
+        "step cameras",
+        "given back",
+        "event cameras",
+    ]

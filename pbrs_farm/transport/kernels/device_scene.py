@@ -5,6 +5,7 @@ No effects beyond the buffers of a DeviceScene on the device.
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -69,6 +70,11 @@ class SurfaceInteraction(NamedTuple):
     face: Any  # UInt32
     target_pdf: Any  # per m2, of guided rays that aim at p on this side (guiding_targets.py)
     target_emitter: Any  # UInt32, the emitter those rays go for
+
+
+def with_device_texels(tables: SceneTables) -> SceneTables:
+    """Tables with their texels, most of their bytes, on the device alone."""
+    return replace(tables, texels=device_array(mi.UInt32, tables.texels))
 
 
 class DeviceScene:

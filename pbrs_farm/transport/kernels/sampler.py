@@ -19,7 +19,6 @@ from pbrs_farm.raycast.host_memory import with_slack
 
 CAMERA_DIMS = 2  # dimensions of the film position
 VERTEX_DIMS = 10  # of each vertex (path_step.py)
-_COPIED_AT_ONCE = 1 << 22  # values of a host array on their way to the device
 
 
 class Sampler(Protocol):
@@ -79,20 +78,20 @@ class SobolSampler:
 
 
 def device_array(kind: Any, values: Any) -> Any:
-    """A 1D array on the device, in memory of Dr.Jit's own.
+    """A 1D array on the device, in memory of Dr.Jit's own; one that is there already is returned.
 
     An array that merely wraps NumPy's memory may be less aligned; then its packet gathers fall
     apart into single ones, and the kernel is another one each time.
     """
+    if isinstance(values, kind):
+        return values
     host = np.asarray(values)
+    if dr.backend_v(kind) != dr.JitBackend.LLVM:
+        return kind(with_slack(host))
     copy = dr.empty(kind, len(host))
-    # Copy in parts: a home has 40 million texels.
-    for start in range(0, len(host), _COPIED_AT_ONCE):
-        wrapped = kind(with_slack(host[start : start + _COPIED_AT_ONCE]))
-        place = dr.arange(mi.UInt32, len(wrapped))
-        dr.scatter(copy, wrapped, place + dr.opaque(mi.UInt32, start) if start else place)
-        dr.eval(copy)
-        dr.sync_thread()  # before NumPy frees the copied arrays
+    # Running kernels may still use the memory, which this process shares with them.
+    dr.sync_thread()
+    copy.numpy()[:] = host
     return copy
 
 
