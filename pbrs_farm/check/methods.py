@@ -117,7 +117,7 @@ def _light_fault(view: StoredView) -> str:
         return "no recipe.json that says how it was developed"
     if not view.has("radiance.exr"):
         return "no radiance.exr to develop"
-    if view.recipe.sensor.is_on or view.recipe.tone.camera != "neutral":
+    if view.recipe.camera_of("", "").sensor.is_on:
         return "taken by a sensor: compared by tiles of 16 px, not by pixels"
     if view.recipe.tone.variants:
         return "its variants are taken by sensors: compared by tiles of 16 px, not by pixels"

@@ -2,12 +2,14 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
 from typing import Any
 
 from pbrs_farm.check.stored_files import BadFile, stored_object
+from pbrs_farm.core import keys
 
 
 def _document(file: Path) -> dict[str, Any]:
@@ -67,11 +69,18 @@ class StoredHouse:
 
     @cached_property
     def lamps(self) -> dict[str, tuple[int, int]]:
-        """Name of each light (its item's id, `/n` behind it if it has several) -> instance and number."""
-        return {
+        """Name of each lit lamp (its item's id, `/n` behind it if it has several) -> instance and number."""
+        lights = {
             f"{row['id']}/{k}" if len(row["lights"]) > 1 else row["id"]: (instance, k)
             for instance, row in sorted(self.items.items())
             for k in range(len(row["lights"]))
+        }
+        share = self.recipe.get("emission", {}).get("lamps_on", 1.0)
+        home, seed = re.sub(r"-e[0-9a-f]{8}$", "", self.id), self.recipe.get("seed", 0)
+        return {
+            name: place
+            for name, place in lights.items()
+            if keys.seed("lamp on", name, home, seed) < share * 2**32
         }
 
     def light(self, name: str) -> dict[str, Any]:

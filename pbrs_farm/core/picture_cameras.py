@@ -31,12 +31,14 @@ class CameraRow:
     tone: Mapping[str, float] = field(default_factory=dict)  # fields of the group tone
     spread: Mapping[str, float] = field(default_factory=dict)  # standard deviations, view by view
     sensor: str = "none"  # a preset of the group sensor
+    dim_share: float = 0.0  # share of dim views
+    dim_ev: tuple[float, float] = (0.0, 0.0)  # range of their exposure, stops
 
 
 CAMERAS: Final = read_toml(Path(__file__).with_suffix(".toml"), dict[str, CameraRow])
 
-ERRING: Final = tuple(name for name, row in CAMERAS.items() if row.spread)
-"""The cameras that `drawn` and variants choose from: all but `neutral`."""
+ERRING: Final = tuple(name for name, row in CAMERAS.items() if row.sensor != "none")
+"""The cameras that `drawn` and variants choose from: those with a sensor."""
 
 CAMERA_NAMES: Final = (*CAMERAS, DRAWN)
 """The values of `tone.camera`."""
@@ -81,6 +83,8 @@ def picture_camera(name: str, tone: ToneFields, sensor: SensorFields, seed: int)
         z = deviation * float(rng.normal())
         value = values.get(f, getattr(tone, f))
         values[f] = round(value * 2**z if f == "contrast" else value + z, 4)
+    if row.dim_share > 0 and rng.random() < row.dim_share:
+        values["exposure_ev"] = round(tone.exposure_ev + float(rng.uniform(*row.dim_ev)), 4)
     if not sensor.is_on and row.sensor != "none":
         sensor = SensorFields(preset=row.sensor, **sensor.model_dump(exclude_defaults=True))
     return PictureCamera(name, tone.model_copy(update={**values, "camera": name}), sensor)

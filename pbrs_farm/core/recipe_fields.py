@@ -397,6 +397,13 @@ class EmissionFields(FieldGroup):
     released_bulb: float = field(400.0, "radiance, W m-2 sr-1", 0, 1e7)
     released_shade: float = field(0.5, "radiance, W m-2 sr-1", 0, 1e7)
     released_sky: float = field(75.0, "factor of the sky's picture", 0, 1e7)
+    lamps_on: Share = field(1.0, "share of the lamps that are on, drawn by home and lamp")
+
+    @model_serializer(mode="wrap")
+    def _without_switches(self, handler: SerializerFunctionWrapHandler) -> dict[str, Any]:
+        """The fields; lamps_on only if some are off, so that digests and seeds of other recipes stay."""
+        fields: dict[str, Any] = handler(self)
+        return {name: value for name, value in fields.items() if name != "lamps_on" or value < 1}
 
 
 class MaterialFields(FieldGroup):
@@ -415,7 +422,7 @@ class ToneFields(FieldGroup):
     preset: Literal["photo", "released"] = field("photo", "as photographs, or as the paper")
     key: float = field(0.18, "released: Reinhard's key value", high=1000, above=0)
     white_balance: float = field(0.7, "correction of the light's colour; 0 = none, 1 = white", 0, 1)
-    camera: Literal["neutral", "phone", "slr", "webcam", "kinect", "drawn"] = field(
+    camera: Literal["neutral", "snapshot", "phone", "slr", "webcam", "kinect", "drawn"] = field(
         "neutral", "photo: camera of the pictures (docs/light.md); drawn: one of these per view"
     )
     variants: int = field(0, "more pictures of mlt_il_ol, by random cameras", 0, 8)

@@ -10,6 +10,7 @@ import numpy as np
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64, I64, Bools, triple
+from pbrs_farm.core.edits import unedited_id
 from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.house import Geometry, House, Item, LightPart, MaterialKind
 from pbrs_farm.core.lighting import flux_lm
@@ -41,7 +42,7 @@ class AreaEmitter:
 def area_emitters_of_house(
     house: House, geometry: Geometry, keep: Bools, recipe: Recipe
 ) -> tuple[AreaEmitter, ...]:
-    """The emitters of every light part with a face, in the order of items and their light parts.
+    """The emitters of every lit light part with a face, in the order of items and their light parts.
 
     Preset `photometric`: radiance = flux / (179 pi area), where the area of a closed bulb is its
     outside and that of an open surface both its sides (faces emit to both; what a bulb emits
@@ -60,9 +61,10 @@ def area_emitters_of_house(
             faces = np.concatenate(
                 [np.zeros(0, np.int64), *(face_of.get(j, _NO_FACES) for j in mine)]
             )
-            if len(faces):
+            name = f"{item.id}/{k}" if len(item.lights) > 1 else item.id
+            if len(faces) and _is_on(name, house.id, recipe):
                 flux = _flux_and_rgb(house, part, k, item, recipe)
-                emitters.append(_bulb_emitter(house, geometry, (index, k), faces, flux, recipe))
+                emitters.append(_bulb_emitter(house, geometry, (index, name), faces, flux, recipe))
         # Let shades emit by themselves where the published renderer had them do so.
         if released:
             for j, surface in enumerate(item.surfaces):
@@ -73,6 +75,12 @@ def area_emitters_of_house(
                     )
         number += len(item.surfaces)
     return tuple(emitters)
+
+
+def _is_on(name: str, house_id: str, recipe: Recipe) -> bool:
+    """True if a lamp is on: all are, unless the recipe's share is below 1; edits of a home keep the draw."""
+    draw = keys.seed("lamp on", name, unedited_id(house_id), recipe.seed) / 2**32
+    return draw < recipe.emission.lamps_on
 
 
 def _faces_by_surface(geometry: Geometry, keep: Bools) -> dict[int, I64]:
@@ -107,12 +115,12 @@ def lamp_rgb(part: LightPart, name: str, fields: EmissionFields, seed: int) -> F
 def _bulb_emitter(
     house: House,
     geometry: Geometry,
-    place: tuple[int, int],
+    place: tuple[int, str],
     faces: I64,
     flux_and_rgb: tuple[float, F64],
     recipe: Recipe,
 ) -> AreaEmitter:
-    index, k = place
+    index, name = place
     item = house.items[index]
     corners = corners_of_faces(geometry, faces)
     areas = face_areas(corners)
@@ -124,7 +132,6 @@ def _bulb_emitter(
     if recipe.emission.preset == "released":
         radiance = np.full(3, recipe.emission.released_bulb)
         flux = LM_PER_W * math.pi * outside * recipe.emission.released_bulb
-    name = f"{item.id}/{k}" if len(item.lights) > 1 else item.id
     return AreaEmitter(name, index, item.room_id, faces, areas, triple(radiance), area, flux)
 
 

@@ -159,10 +159,23 @@ def test_values_of_the_recipe_are_used_for_every_camera() -> None:
     assert fixed.full_well_e == phone["full_well_e"]
 
 
+def test_snapshots_err_in_exposure_one_in_eight_is_dim_and_none_has_a_sensor() -> None:
+    recipe = recipe_from_name("fast", {"tone.camera": "snapshot"})
+    cameras = [recipe.camera_of("h", f"0_0_{k}") for k in range(400)]
+    stops = np.array([c.tone.exposure_ev for c in cameras])
+    assert not any(c.sensor.is_on for c in cameras)
+    assert -0.65 < stops.mean() < -0.35
+    assert 0.08 < (stops < -1.2).mean() < 0.2
+    # The recipe's own exposure is added, to dim views too.
+    brighter = recipe_from_name("fast", {"tone.camera": "snapshot", "tone.exposure_ev": "1"})
+    added = [brighter.camera_of("h", f"0_0_{k}").tone.exposure_ev for k in range(400)]
+    assert 1.0 < np.mean(added) - stops.mean() < 1.35
+
+
 def test_drawn_cameras_are_of_all_kinds_and_of_a_variant_another_each() -> None:
     recipe = recipe_from_name("fast", {"tone.camera": "drawn"})
     names = [recipe.camera_of("h", f"0_0_{k}").name for k in range(200)]
-    assert set(names) == set(ERRING) == set(CAMERAS) - {"neutral"}
+    assert set(names) == set(ERRING) == set(CAMERAS) - {"neutral", "snapshot"}
     assert min(names.count(name) for name in ERRING) > 20
     plain = recipe_from_name("fast")
     assert plain.camera_of("h", "0_0_1").name == "neutral"

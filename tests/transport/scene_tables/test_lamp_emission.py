@@ -2,10 +2,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from pathlib import Path
 
 import numpy as np
 import pytest
 
+from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.house import House, geometry_from_house
 from pbrs_farm.core.recipe import recipe_from_name
@@ -34,6 +36,30 @@ def flux_of(house: House) -> float:
     geometry = geometry_from_house(house)
     (lamp,) = area_emitters_of_house(house, geometry, np.ones(len(geometry.faces), bool), FAST)
     return float(np.array(lamp.radiance) @ LUMINANCE * LM_PER_W * math.pi * lamp.area_m2)
+
+
+def test_half_the_lamps_are_on_of_every_edit_of_a_home_and_verify_draws_the_same(
+    tmp_path: Path,
+) -> None:
+    bulbs = [replace(rooms.bulb((k, 1, 0), 0, 800.0), id=f"bulb{k}") for k in range(40)]
+    house = replace(rooms.house([], [rooms.BULB], lamps=bulbs), id="home-1")
+    geometry = geometry_from_house(house)
+    keep = np.ones(len(geometry.faces), bool)
+    assert len(area_emitters_of_house(house, geometry, keep, FAST)) == 40
+    half = recipe_from_name("fast", {"emission.lamps_on": "0.5"})
+    names = [x.name for x in area_emitters_of_house(house, geometry, keep, half)]
+    assert 10 < len(names) < 30
+    edited = area_emitters_of_house(replace(house, id="home-1-e01234567"), geometry, keep, half)
+    assert [x.name for x in edited] == names
+    # The check reads the recipe and the items of the output root.
+    folder = tmp_path / "houses" / house.id
+    folder.mkdir(parents=True)
+    (tmp_path / "recipe.json").write_text(half.model_dump_json())
+    items = [{"instance": k, "id": b.id, "lights": [{}]} for k, b in enumerate(bulbs)]
+    assert list(StoredHouse(folder, {"items": items}).lamps) == names
+    # A recipe with all lamps on keeps its digest: the field is not in it.
+    assert "lamps_on" not in FAST.model_dump()["emission"]
+    assert half.model_dump()["emission"]["lamps_on"] == 0.5
 
 
 def test_a_bulb_sends_out_the_flux_of_its_source() -> None:
