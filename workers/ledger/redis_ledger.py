@@ -59,15 +59,64 @@ _REAP_MOST: Final = 200  # in one script, which nobody else can interrupt
 _RESEND_MOST: Final = 500
 
 
+@contextmanager
+def _errors(where: str) -> Iterator[None]:
+    """Refusals and failures of Redis become LedgerUnavailable; bugs pass through."""
+    try:
+        yield
+    # From the special to the general.
+    except redis.AuthenticationError as error:
+        raise LedgerUnavailable(f"{where} rejects these credentials: {error}") from error
+    except redis.exceptions.NoPermissionError as error:
+        raise LedgerUnavailable(f"{where} denies: {error}") from error
+    except RefusedForNow as error:
+        is_full = error.prefix == "OOM"
+        hint = "raise maxmemory" if is_full else "wait, or see the log of Redis"
+        # Redis 6 writes the script and its line before the prefix.
+        text = error.prefix + str(error).partition(error.prefix)[2]
+        raise LedgerUnavailable(f"{where} refused: {text}", hint=hint) from error
+    except (redis.ConnectionError, redis.TimeoutError) as error:
+        hint = "is it running? see PBRS_REDIS_URL"
+        raise LedgerUnavailable(f"no Redis at {where}: {error}", hint=hint) from error
+
+
+class _Pipeline(redis.client.Pipeline):
+    """redis-py's pipeline, which raises LedgerUnavailable."""
+
+    where = ""  # its URL without secrets
+
+    def execute(self, raise_on_error: bool = True) -> list[Any]:
+        with _errors(self.where):
+            return list(super().execute(raise_on_error))
+
+
+class _Client(redis.Redis):
+    """redis-py's client, which raises LedgerUnavailable."""
+
+    where = ""
+
+    def execute_command(self, *args: Any, **options: Any) -> Any:
+        with _errors(self.where):
+            return super().execute_command(*args, **options)
+
+    def pipeline(self, transaction: bool = True, shard_hint: Any = None) -> _Pipeline:
+        pipe = _Pipeline(self.connection_pool, self.response_callbacks, transaction, shard_hint)
+        pipe.where = self.where
+        return pipe
+
+
 def redis_client(config: FarmConfig) -> Any:
-    """A client that retries lost connections and passing refusals for seconds, but no timeout. Typed Any."""
+    """A client that retries lost connections and passing refusals for seconds, but no timeout. Typed Any.
+
+    Where Redis is away or refuses it raises LedgerUnavailable.
+    """
     url = config.redis_url.reveal()
     scheme = url.partition(":")[0]
     kind = {"connection_class": BY_SCHEME[scheme]} if scheme in BY_SCHEME else {}
     # TLS with a checked certificate, or none at all.
     ca = {"ssl_ca_certs": config.redis_ca} if config.redis_ca else {}
     tls: dict[str, Any] = {"ssl_cert_reqs": "required", **ca} if url.startswith("rediss:") else {}
-    return redis.Redis.from_url(
+    client = _Client.from_url(
         url,
         decode_responses=True,
         socket_timeout=ANSWER_S,
@@ -79,6 +128,8 @@ def redis_client(config: FarmConfig) -> Any:
         **kind,
         **tls,
     )
+    client.where = shown_url(url)
+    return client
 
 
 def lua_constants() -> str:
@@ -111,8 +162,9 @@ def script_text(name: str) -> str:
 class RedisLedger:
     """Implements workers.ledger.task_ledger.Ledger in one Redis; one per process, safe after a fork.
 
-    All methods raise LedgerUnavailable where Redis is away, refuses for now or refuses the password. Each
-    change is one Lua script (ledger/lua), whole or not at all; `common.lua` lists the keys. Times are Redis'.
+    The client, and so all methods, raise LedgerUnavailable where Redis is away, refuses for now or refuses the
+    password. Each change is one Lua script (ledger/lua), whole or not at all; `common.lua` lists the keys. Times
+    are Redis'.
 
     client: a redis-py client that decodes its answers; made from the configuration by default.
     """
@@ -121,7 +173,6 @@ class RedisLedger:
         self.config = config
         self.client = client or redis_client(config)
         self._g = config.prefix
-        self._where = shown_url(config.redis_url.reveal())
         self._scripts: dict[str, Any] = {
             name: self.client.register_script(script_text(name)) for name in _SCRIPTS
         }
@@ -161,59 +212,55 @@ class RedisLedger:
         loading job: `open` follows.
         """
         p = self._p(job)
-        with self.errors():
-            # Chunks bound the size of a transaction, which blocks Redis while it runs.
-            for start in range(0, len(houses), _CHUNK):
-                chunk = houses[start : start + _CHUNK]
-                pipe = self.client.pipeline(transaction=True)
-                pipe.rpush(
-                    f"{p}order", *(f"{first + start + k}|{h.house_id}" for k, h in enumerate(chunk))
-                )
-                sources = {h.house_id: h.source for h in chunk if h.source}
-                if sources:
-                    pipe.hset(f"{p}sources", mapping=sources)
-                pipe.execute()
+        # Chunks bound the size of a transaction, which blocks Redis while it runs.
+        for start in range(0, len(houses), _CHUNK):
+            chunk = houses[start : start + _CHUNK]
+            pipe = self.client.pipeline(transaction=True)
+            pipe.rpush(
+                f"{p}order", *(f"{first + start + k}|{h.house_id}" for k, h in enumerate(chunk))
+            )
+            sources = {h.house_id: h.source for h in chunk if h.source}
+            if sources:
+                pipe.hset(f"{p}sources", mapping=sources)
+            pipe.execute()
 
     def load_houses(self, job: str, houses: Iterable[HouseState]) -> int:
         """Enter new houses with their progress in storage, in order, for `recover`; their number."""
         # Many calls in one round trip; each script is one house, and atomic.
         n_new = 0
         script, keys = self._scripts["load"], self._keys(job)
-        with self.errors():
-            for chunk in _in_chunks(houses):
-                pipe = self.client.pipeline(transaction=False)
-                for house in chunk:
-                    units = [x for u, unit_state in house.units.items() for x in (u, *unit_state)]
-                    state = "done" if house.done else "loaded"
-                    batches = text_from_batches(house.batches)
-                    args = [house.index, house.house_id, state, batches, *units]
-                    script(keys=keys, args=args, client=pipe)
-                n_new += sum(pipe.execute())
+        for chunk in _in_chunks(houses):
+            pipe = self.client.pipeline(transaction=False)
+            for house in chunk:
+                units = [x for u, unit_state in house.units.items() for x in (u, *unit_state)]
+                state = "done" if house.done else "loaded"
+                batches = text_from_batches(house.batches)
+                args = [house.index, house.house_id, state, batches, *units]
+                script(keys=keys, args=args, client=pipe)
+            n_new += sum(pipe.execute())
         return n_new
 
     def open(self, job: str, priority: int) -> None:
         """The job is loaded and may be dispatched, 0 first: the last call of making a job."""
-        with self.errors():
-            pipe = self.client.pipeline(transaction=True)
-            pipe.hset(f"{self._p(job)}job", "state", "running")
-            pipe.zadd(f"{self._g}jobs", {job: priority})
-            pipe.zadd(f"{self._g}known", {job: self.now()})
-            pipe.lpush(f"{self._g}notify", "1")
-            pipe.execute()
+        pipe = self.client.pipeline(transaction=True)
+        pipe.hset(f"{self._p(job)}job", "state", "running")
+        pipe.zadd(f"{self._g}jobs", {job: priority})
+        pipe.zadd(f"{self._g}known", {job: self.now()})
+        pipe.lpush(f"{self._g}notify", "1")
+        pipe.execute()
 
     def forget(self, job: str) -> None:
         """Remove an ended job from the ledger, by a slow scan that blocks nobody; storage stays."""
-        with self.errors():
-            self.client.zrem(f"{self._g}jobs", job)
-            self.client.zrem(f"{self._g}known", job)
-            # The farm's leases of this job, then all its own keys.
-            for name in POOLS:
-                key = f"{self._g}lease:{name}"
-                members = self.client.zscan_iter(key, match=f"{job}|*")
-                for member, _score in members:
-                    self.client.zrem(key, member)
-            for own_keys in _in_chunks(self.client.scan_iter(f"{self._p(job)}*", count=_CHUNK)):
-                self.client.unlink(*own_keys)
+        self.client.zrem(f"{self._g}jobs", job)
+        self.client.zrem(f"{self._g}known", job)
+        # The farm's leases of this job, then all its own keys.
+        for name in POOLS:
+            key = f"{self._g}lease:{name}"
+            members = self.client.zscan_iter(key, match=f"{job}|*")
+            for member, _score in members:
+                self.client.zrem(key, member)
+        for own_keys in _in_chunks(self.client.scan_iter(f"{self._p(job)}*", count=_CHUNK)):
+            self.client.unlink(*own_keys)
 
     def steer(self, job: str, what: str, reason: str = "") -> str:
         """pause, resume, cancel, reduce, or a field and its number; the state, "" if unknown."""
@@ -291,9 +338,8 @@ class RedisLedger:
 
     def resign(self, token: str) -> None:
         """Give up the lead, if it is ours, so that a standby need not wait for its expiry."""
-        with self.errors():
-            if self.client.get(f"{self._g}leader") == token:
-                self.client.delete(f"{self._g}leader")
+        if self.client.get(f"{self._g}leader") == token:
+            self.client.delete(f"{self._g}leader")
 
     def reap(self, token: str) -> int:
         """End, some hundred at most, leases without heartbeats; how many, -1 when not leading."""
@@ -324,10 +370,9 @@ class RedisLedger:
         queues: () lets every worker claim again; (EVERYWHERE,) stops all. why: shown by `status`.
         Tasks that run go on.
         """
-        with self.errors():
-            if self.client.exists(f"{self._p(job)}job"):
-                fields = {"blocked": ",".join(queues), "blocked_why": why}
-                self.client.hset(f"{self._p(job)}job", mapping=fields)
+        if self.client.exists(f"{self._p(job)}job"):
+            fields = {"blocked": ",".join(queues), "blocked_why": why}
+            self.client.hset(f"{self._p(job)}job", mapping=fields)
 
     def preempt(self, job: str, token: str, holds: Sequence[Hold]) -> int:
         """Let these tasks end at their next heartbeat; returns the number of new ones, -1: not leading.
@@ -341,35 +386,30 @@ class RedisLedger:
     def set_rates(self, job: str, rates: Mapping[str, float]) -> None:
         """Keep stage -> tasks per second, measured by the leader, for `view`; unnamed stages keep theirs."""
         if rates:
-            with self.errors():
-                self.client.hset(f"{self._p(job)}rate", mapping=dict(rates))
+            self.client.hset(f"{self._p(job)}rate", mapping=dict(rates))
 
     def set_notified(self, job: str, outcome: str) -> None:
         """Keep which end or pause of the job was posted to the webhook last, "" for none."""
-        with self.errors():
-            # A job forgotten in the meantime stays forgotten.
-            if self.client.exists(f"{self._p(job)}job"):
-                self.client.hset(f"{self._p(job)}job", "notified", outcome)
+        # A job forgotten in the meantime stays forgotten.
+        if self.client.exists(f"{self._p(job)}job"):
+            self.client.hset(f"{self._p(job)}job", "notified", outcome)
 
     def wait(self, seconds: float) -> None:
         """Wait so long at most, less when a task becomes ready meanwhile."""
-        with self.errors():
-            self.client.blpop([f"{self._g}notify"], timeout=seconds)
+        self.client.blpop([f"{self._g}notify"], timeout=seconds)
 
     def queue_length(self, queue: str) -> int:
         """Messages waiting on a queue of the broker."""
-        with self.errors():
-            return int(self.client.llen(f"{self._g}{queue}"))
+        return int(self.client.llen(f"{self._g}{queue}"))
 
     # Reading
 
     def view(self, job: str) -> JobView | None:
         """The job's current state by a handful of O(1) reads; None for an unknown job."""
         p = self._p(job)
-        with self.errors():
-            pipe = self.client.pipeline(transaction=False)
-            pipe.hgetall(f"{p}job").hgetall(f"{p}n").hgetall(f"{p}rate").llen(f"{p}order")
-            fields, counts, rates, n_waiting = pipe.execute()
+        pipe = self.client.pipeline(transaction=False)
+        pipe.hgetall(f"{p}job").hgetall(f"{p}n").hgetall(f"{p}rate").llen(f"{p}order")
+        fields, counts, rates, n_waiting = pipe.execute()
         if not fields:
             return None
         numbers = {k: float(v) for k, v in counts.items()}
@@ -377,69 +417,59 @@ class RedisLedger:
 
     def age_s(self, view: JobView) -> float:
         """Seconds since the job was entered, by Redis' clock."""
-        with self.errors():
-            return self.now() - float(view.fields.get("created", 0.0))
+        return self.now() - float(view.fields.get("created", 0.0))
 
     def active_jobs(self) -> list[str]:
         """Jobs that may have work, most urgent first."""
-        with self.errors():
-            return list(self.client.zrange(f"{self._g}jobs", 0, -1))
+        return list(self.client.zrange(f"{self._g}jobs", 0, -1))
 
     def known_jobs(self) -> list[str]:
         """Every job in the ledger, oldest first."""
-        with self.errors():
-            return list(self.client.zrange(f"{self._g}known", 0, -1))
+        return list(self.client.zrange(f"{self._g}known", 0, -1))
 
     def unit_states(self, job: str, house: str) -> dict[str, str]:
         """The house's hash: unit -> "<stage>:<letter>", and s (state), n, left, nf, i; or {}."""
-        with self.errors():
-            return dict(self.client.hgetall(f"{self._p(job)}h:{house}"))
+        return dict(self.client.hgetall(f"{self._p(job)}h:{house}"))
 
     def finished(self, job: str, houses: Iterable[str]) -> list[str]:
         """The finished (not the quarantined) ones of the houses, a round trip per thousand."""
         done: list[str] = []
         for chunk in _in_chunks(houses):
-            with self.errors():
-                pipe = self.client.pipeline(transaction=False)
-                for house in chunk:
-                    pipe.hget(f"{self._p(job)}h:{house}", "s")
-                states = pipe.execute()
+            pipe = self.client.pipeline(transaction=False)
+            for house in chunk:
+                pipe.hget(f"{self._p(job)}h:{house}", "s")
+            states = pipe.execute()
             done += [house for house, s in zip(chunk, states, strict=True) if s == "done"]
         return done
 
     def batches(self, job: str, house: str) -> tuple[tuple[str, ...], ...]:
         """The house's batches of views, () before they are known."""
-        with self.errors():
-            return batches_from_text(self.client.hget(f"{self._p(job)}views", house) or "")
+        return batches_from_text(self.client.hget(f"{self._p(job)}views", house) or "")
 
     def task_facts(self, job: str, task: str) -> dict[str, str]:
         """Known ones of "claim", "attempts", "tried", "fault" (JSON), "not_before", "sent" (Redis' s)."""
         p = self._p(job)
-        with self.errors():
-            pipe = self.client.pipeline(transaction=False)
-            for name in ("claims", "attempts", "tried", "failed"):
-                pipe.hget(p + name, task)
-            pipe.zscore(f"{p}later", task).zscore(f"{p}queued", task)
-            values = pipe.execute()
+        pipe = self.client.pipeline(transaction=False)
+        for name in ("claims", "attempts", "tried", "failed"):
+            pipe.hget(p + name, task)
+        pipe.zscore(f"{p}later", task).zscore(f"{p}queued", task)
+        values = pipe.execute()
         names = ("claim", "attempts", "tried", "fault", "not_before", "sent")
         return {n: str(v) for n, v in zip(names, values, strict=True) if v is not None}
 
     def lease_left_s(self, job: str, task: str, lease: str) -> float | None:
         """Seconds (negative: to be reaped) until a running task's lease, by its name, ends; or None."""
-        with self.errors():
-            end = self.client.zscore(f"{self._g}lease:{lease}", f"{job}|{task}")
-            return None if end is None else float(end) - self.now()
+        end = self.client.zscore(f"{self._g}lease:{lease}", f"{job}|{task}")
+        return None if end is None else float(end) - self.now()
 
     def faults(self, job: str) -> Iterator[tuple[str, Fault]]:
         """Every task that failed for good, in no order, read while iterating."""
-        with self.errors():
-            for task, text in self.client.hscan_iter(f"{self._p(job)}failed", count=_CHUNK):
-                yield task, fault_from_json(text)
+        for task, text in self.client.hscan_iter(f"{self._p(job)}failed", count=_CHUNK):
+            yield task, fault_from_json(text)
 
     def holds(self, job: str) -> list[Hold]:
         """Every task of the job that runs, or was claimed by a slot with a running one."""
-        with self.errors():
-            claims = self.client.hgetall(f"{self._p(job)}claims")
+        claims = self.client.hgetall(f"{self._p(job)}claims")
         return [hold_from_text(job, task, text) for task, text in claims.items()]
 
     def claims(self, job: str) -> dict[str, tuple[str, float]]:
@@ -448,8 +478,7 @@ class RedisLedger:
 
     def ping(self) -> None:
         """Raises LedgerUnavailable when Redis does not answer or refuses us."""
-        with self.errors():
-            self.client.ping()
+        self.client.ping()
 
     def wait_until_there(
         self, patience_s: float = 300.0, meanwhile: Callable[[], object] = lambda: None
@@ -479,28 +508,7 @@ class RedisLedger:
         return [self._p(job), self._g]
 
     def _run(self, name: str, job: str, *args: object) -> Any:
-        with self.errors():
-            return self._scripts[name](keys=self._keys(job), args=list(args))
-
-    @contextmanager
-    def errors(self) -> Iterator[None]:
-        """Around calls of `client`: refusals and failures become LedgerUnavailable; bugs pass through."""
-        try:
-            yield
-        # From the special to the general; the URL is shown without its password.
-        except redis.AuthenticationError as error:
-            raise LedgerUnavailable(f"{self._where} rejects these credentials: {error}") from error
-        except redis.exceptions.NoPermissionError as error:
-            raise LedgerUnavailable(f"{self._where} denies: {error}") from error
-        except RefusedForNow as error:
-            is_full = error.prefix == "OOM"
-            hint = "raise maxmemory" if is_full else "wait, or see the log of Redis"
-            # Redis 6 writes the script and its line before the prefix.
-            text = error.prefix + str(error).partition(error.prefix)[2]
-            raise LedgerUnavailable(f"{self._where} refused: {text}", hint=hint) from error
-        except (redis.ConnectionError, redis.TimeoutError) as error:
-            hint = "is it running? see PBRS_REDIS_URL"
-            raise LedgerUnavailable(f"no Redis at {self._where}: {error}", hint=hint) from error
+        return self._scripts[name](keys=self._keys(job), args=list(args))
 
 
 def _tasks(answer: object) -> list[str] | None:

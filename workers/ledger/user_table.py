@@ -37,8 +37,7 @@ class UserTable:
 
     def all(self) -> dict[str, User]:
         """Every user by name, in order, by one read; {} on a farm without users."""
-        with self._ledger.errors():
-            rows = self._ledger.client.hgetall(self._key)
+        rows = self._ledger.client.hgetall(self._key)
         return {name: user_from_row(json.loads(row)) for name, row in sorted(rows.items())}
 
     def named_by(self, token: str) -> User | None:
@@ -68,24 +67,22 @@ class UserTable:
         return bool(users)
 
     def _enter(self, rows: Mapping[str, str]) -> None:
-        with self._ledger.errors():
-            pipe = self._ledger.client.pipeline(transaction=True)
-            pipe.delete(self._key)
-            if rows:
-                pipe.hset(self._key, mapping=dict(rows))
-            pipe.execute()
+        pipe = self._ledger.client.pipeline(transaction=True)
+        pipe.delete(self._key)
+        if rows:
+            pipe.hset(self._key, mapping=dict(rows))
+        pipe.execute()
 
     def spent_h(self) -> dict[str, float]:
         """User -> slot-hours, if any, of the tasks finished in the last SPENT_DAYS days (UTC)."""
         client = self._ledger.client
-        with self._ledger.errors():
-            today = int(self._ledger.now() // _DAY_S)
-            keys = [f"{self._ledger.config.prefix}spent:{today - k}" for k in range(SPENT_DAYS)]
-            pipe = client.pipeline(transaction=False)
-            for key in keys:
-                pipe.hgetall(key)
-            pipe.expire(keys[0], (SPENT_DAYS + 1) * _DAY_S)  # so that no day is kept for ever
-            days: list[dict[str, str]] = pipe.execute()[:-1]
+        today = int(self._ledger.now() // _DAY_S)
+        keys = [f"{self._ledger.config.prefix}spent:{today - k}" for k in range(SPENT_DAYS)]
+        pipe = client.pipeline(transaction=False)
+        for key in keys:
+            pipe.hgetall(key)
+        pipe.expire(keys[0], (SPENT_DAYS + 1) * _DAY_S)  # so that no day is kept for ever
+        days: list[dict[str, str]] = pipe.execute()[:-1]
         seconds_of_user: dict[str, float] = {}
         for day in days:
             for name, seconds in day.items():
@@ -94,16 +91,14 @@ class UserTable:
 
     def note(self, row: Mapping[str, str]) -> None:
         """Keep a line, text to text, of who changed what; the last _MOST_CHANGES stay for `changes`."""
-        with self._ledger.errors():
-            pipe = self._ledger.client.pipeline(transaction=False)
-            pipe.lpush(self._audit, json.dumps(dict(row)))
-            pipe.ltrim(self._audit, 0, _MOST_CHANGES - 1)
-            pipe.execute()
+        pipe = self._ledger.client.pipeline(transaction=False)
+        pipe.lpush(self._audit, json.dumps(dict(row)))
+        pipe.ltrim(self._audit, 0, _MOST_CHANGES - 1)
+        pipe.execute()
 
     def changes(self, n: int) -> list[dict[str, str]]:
         """The last n lines of who changed what, newest first."""
-        with self._ledger.errors():
-            return [json.loads(line) for line in self._ledger.client.lrange(self._audit, 0, n - 1)]
+        return [json.loads(line) for line in self._ledger.client.lrange(self._audit, 0, n - 1)]
 
 
 def user_from_row(row: Mapping[str, Any]) -> User:

@@ -190,6 +190,12 @@ def test_redis_away_or_wrong_password_is_one_line_without_the_password(config: F
         RedisLedger(away).ping()
     assert "hush" not in str(caught.value)
     assert "\n" not in str(caught.value)
+    for ask in (
+        lambda client: client.info("memory"),
+        lambda client: client.pipeline().ping().execute(),
+    ):
+        with pytest.raises(LedgerUnavailable, match="no Redis at redis://127"):
+            ask(RedisLedger(away).client)
 
 
 def test_a_service_waits_for_redis_unless_it_is_refused(
