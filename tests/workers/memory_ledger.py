@@ -3,17 +3,15 @@
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 
-from workers.job import HouseEntry, JobSpec
 from workers.ledger.task_ledger import (
     Claim,
     Fault,
     Finished,
     GoOn,
     Hold,
-    HouseState,
     JobView,
     LedgerUnavailable,
     WorkerView,
@@ -22,7 +20,7 @@ from workers.ledger.task_ledger import (
 
 @dataclass
 class MemoryLedger:
-    """Implements workers.ledger.task_ledger.Ledger for tasks that a test inserts."""
+    """What a slot and a coordinator call of RedisLedger, for tasks that a test inserts."""
 
     ready: list[str] = field(default_factory=list)
     queued: list[str] = field(default_factory=list)
@@ -54,27 +52,9 @@ class MemoryLedger:
             self.n_away -= 1
             raise LedgerUnavailable("no Redis")
 
-    def create(self, spec: JobSpec, store_id: str = "") -> str:
-        raise NotImplementedError
-
-    def add_houses(self, job: str, first: int, houses: Sequence[HouseEntry]) -> None:
-        raise NotImplementedError
-
-    def load_houses(self, job: str, houses: Iterable[HouseState]) -> int:
-        raise NotImplementedError
-
-    def open(self, job: str, priority: int) -> None:
-        raise NotImplementedError
-
-    def forget(self, job: str) -> None:
-        raise NotImplementedError
-
     def steer(self, job: str, what: str, reason: str = "") -> str:
         self.fields |= {"state": "paused", "reason": reason} if what == "pause" else {}
         return self.fields["state"]
-
-    def retry(self, job: str, task: str) -> bool:
-        raise NotImplementedError
 
     def claim_many(
         self, job: str, tasks: Sequence[str], *, token: str, recipe: str, direct: bool = False
@@ -165,9 +145,6 @@ class MemoryLedger:
     def holds(self, job: str) -> list[Hold]:
         return []
 
-    def preempt(self, job: str, token: str, holds: Sequence[Hold]) -> int:
-        raise NotImplementedError
-
     def set_notified(self, job: str, outcome: str) -> None:
         self.fields["notified"] = outcome
 
@@ -186,7 +163,7 @@ class MemoryLedger:
 
 @dataclass
 class MemoryRegistry:
-    """Implements workers.ledger.task_ledger.WorkerRegistry."""
+    """What they call of Registry."""
 
     n_slots: dict[str, int] = field(default_factory=dict)
     refusals: list[str] = field(default_factory=list)

@@ -33,7 +33,8 @@ from workers.ids import (
     stage_of_pool,
     task_from_text,
 )
-from workers.ledger.task_ledger import JobView, Ledger, LedgerUnavailable, User
+from workers.ledger.redis_ledger import RedisLedger
+from workers.ledger.task_ledger import JobView, LedgerUnavailable, User
 
 _log = logging.getLogger("pbrs.coordinator")
 _AHEAD_S: Final = (
@@ -57,7 +58,7 @@ class Dispatcher:
     ledger moves tasks only for the leader's. The leader keeps `slots` and `users` up to date.
     """
 
-    def __init__(self, config: FarmConfig, ledger: Ledger, send: Send, token: str) -> None:
+    def __init__(self, config: FarmConfig, ledger: RedisLedger, send: Send, token: str) -> None:
         self.slots: Mapping[str, int] = {}  # stage -> maximum concurrent tasks of the workers
         self.users: Mapping[str, User] = {}
         self._config = config

@@ -27,14 +27,7 @@ from workers.coordinator.progress_rates import Rates
 from workers.coordinator.turns import choose_victims, find_blocked_jobs
 from workers.coordinator.webhook import FarmAlerts, Webhook, poster, watch_jobs
 from workers.ledger.redis_ledger import RedisLedger
-from workers.ledger.task_ledger import (
-    JobView,
-    Ledger,
-    LedgerUnavailable,
-    User,
-    Users,
-    WorkerRegistry,
-)
+from workers.ledger.task_ledger import JobView, LedgerUnavailable, User
 from workers.ledger.user_table import UserTable
 from workers.ledger.worker_registry import Registry
 from workers.liveness import touch
@@ -68,12 +61,12 @@ class Coordinator:
     def __init__(
         self,
         config: FarmConfig,
-        ledger: Ledger,
+        ledger: RedisLedger,
         send: Send,
         *,
-        registry: WorkerRegistry,
+        registry: Registry,
         notice: Callable[[], None] = lambda: None,
-        users: Users | None = None,
+        users: UserTable | None = None,
         clock: Callable[[], float] = time.monotonic,
     ) -> None:
         self._config = config

@@ -20,7 +20,8 @@ from urllib.parse import urlsplit
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.store.secret import Secret
-from workers.ledger.task_ledger import WITH_FAILURES, JobView, Ledger, LedgerUnavailable, WorkerView
+from workers.ledger.redis_ledger import RedisLedger
+from workers.ledger.task_ledger import WITH_FAILURES, JobView, LedgerUnavailable, WorkerView
 
 _log = logging.getLogger("pbrs.webhook")
 _TIMEOUT_S: Final = 10.0
@@ -40,7 +41,7 @@ _LOST_S: Final = 3600.0  # a worker that died longer ago is history
 class Webhook:
     """Posts each new end or pause of a job once, across leaders, by the ledger; five tries after OSError."""
 
-    def __init__(self, ledger: Ledger, post: Post) -> None:
+    def __init__(self, ledger: RedisLedger, post: Post) -> None:
         self._ledger = ledger
         self._post = post
         self._tries: Counter[tuple[str, str]] = Counter()
@@ -109,7 +110,9 @@ def poster(url: Secret) -> Post:
 
 
 def watch_jobs(
-    webhook: Webhook, ledger: Ledger, look_at: Callable[[list[JobView]], None] = lambda _views: None
+    webhook: Webhook,
+    ledger: RedisLedger,
+    look_at: Callable[[list[JobView]], None] = lambda _views: None,
 ) -> Callable[[], None]:
     """Function for the leader: look_at and webhook check jobs in a thread, which a slow URL may hold."""
     # Taken by begin, given back by the thread that it starts.

@@ -160,7 +160,12 @@ def script_text(name: str) -> str:
 
 
 class RedisLedger:
-    """Implements workers.ledger.task_ledger.Ledger in one Redis; one per process, safe after a fork.
+    """Which task may run, who runs it, how often it was tried, what follows it; one per process, safe after a fork.
+
+    A task's life: `dispatch` takes it from the outbox and its message is sent; a slot asks for it by
+    `claim_many`, keeps its lease by `heartbeat`, and ends it by `finish_many` or `fail`. Leases that are not
+    kept end by `reap`, and the task is tried elsewhere. Results are in the store, from which `recover` rebuilds
+    a lost ledger. Every method may be called again after a lost answer.
 
     The client, and so all methods, raise LedgerUnavailable where Redis is away, refuses for now or refuses the
     password. Each change is one Lua script (ledger/lua), whole or not at all; `common.lua` lists the keys. Times

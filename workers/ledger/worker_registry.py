@@ -18,7 +18,7 @@ _DRAINED_S = 30 * 86400  # a drained worker that comes back within so long stays
 
 
 class Registry:
-    """Implements workers.ledger.task_ledger.WorkerRegistry on the ledger's Redis.
+    """Workers of the farm, and the health of storage, on the ledger's Redis.
 
     A worker calls `heartbeat` every ten seconds and `leave` when it ends; whoever was not seen for ALIVE_S counts
     as dead, and for an hour is forgotten. `drain` outlasts a restart under the same name. Every

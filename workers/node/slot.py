@@ -25,6 +25,7 @@ from pbrs_farm.run.processes.render_process import REPORTED, Ended, RenderProces
 from pbrs_farm.store import Store, store_from_url
 from workers.config import FarmConfig, shown_url
 from workers.ids import GEOMETRY, QUEUES, WHOLE, TaskId, failed_key, log_key, task_from_text
+from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.task_ledger import (
     UNCOUNTED,
     Claim,
@@ -32,11 +33,10 @@ from workers.ledger.task_ledger import (
     FaultClass,
     Finished,
     GoOn,
-    Ledger,
     LedgerUnavailable,
-    WorkerRegistry,
     batches_from_text,
 )
+from workers.ledger.worker_registry import Registry
 from workers.node.faults import without_numbers
 from workers.runner import Result, TaskRequest
 
@@ -79,8 +79,6 @@ def make_slot(config: FarmConfig) -> Slot:
     Effects: creates a folder for its log and starts a process. Call it after the fork of the pool, once per pool
     process: the connections and the child must not be shared.
     """
-    from workers.ledger.redis_ledger import RedisLedger
-    from workers.ledger.worker_registry import Registry
     from workers.node.renderer import HANDLER
 
     # A folder for each pool process, so that their logs do not mix.
@@ -110,8 +108,8 @@ class Slot:
     def __init__(
         self,
         config: FarmConfig,
-        ledger: Ledger,
-        registry: WorkerRegistry,
+        ledger: RedisLedger,
+        registry: Registry,
         process: RenderProcess,
         *,
         clock: Callable[[], float] = time.monotonic,
