@@ -24,6 +24,8 @@ PUBLISHED_FROM_OPENGL: F64 = np.array([[1.0, 0, 0], [0, 0, -1.0], [0, 1.0, 0]], 
 
 # Our axes, y up  <-  those of a file with z up: (x, y, z) is (x, z, -y).
 Y_UP_FROM_Z_UP: Matrix4 = np.array([[1.0, 0, 0, 0], [0, 0, 1, 0], [0, -1, 0, 0], [0, 0, 0, 1]])
+# A world with z up  <-  ours: (x, y, z) is (x, -z, y).
+Z_UP_FROM_Y_UP: Matrix4 = np.array([[1.0, 0, 0, 0], [0, 0, -1, 0], [0, 1, 0, 0], [0, 0, 0, 1]])
 
 
 def opencv_world_from_camera(world_from_camera: Matrix4) -> Matrix4:

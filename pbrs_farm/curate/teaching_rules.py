@@ -15,8 +15,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import ItemKind
-from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of, opengl_normals
-from pbrs_farm.export.sequences import pose_opencv
+from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.formats.output_folder import ViewEntry
 from pbrs_farm.selection.histogram_pack import BLACK
 from pbrs_farm.selection.quality import picture_quality
@@ -94,14 +93,14 @@ def darkness(view: ChosenView) -> float:
 
 def twin_share(view: ChosenView, other: ChosenView) -> float:
     """Share of a pinhole view's points that another, maybe narrower, shows at nearly the same pixel."""
-    i, theirs = intrinsics_of(view.facts), intrinsics_of(other.facts)
-    near = np.linalg.norm(pose_opencv(view)[:3, 3] - pose_opencv(other)[:3, 3]) < _TWIN_M
+    i, theirs = view.intrinsics, other.intrinsics
+    near = np.linalg.norm(view.pose[:3, 3] - other.pose[:3, 3]) < _TWIN_M
     if not (near and i.lens.is_pinhole and theirs.lens.is_pinhole):
         return 0.0
     points, _normals, _n = _grid(view)
     if not len(points):
         return 0.0
-    matrix = np.linalg.inv(pose_opencv(other)) @ pose_opencv(view)
+    matrix = np.linalg.inv(other.pose) @ view.pose
     moved = theirs.pixels(transform_points(matrix, points))
     pixels = i.pixels(points)
     shift = (moved / [theirs.width_px, theirs.height_px]) - (pixels / [i.width_px, i.height_px])
@@ -120,8 +119,8 @@ def _grid(view: ChosenView) -> tuple[F64, F64, int]:
     n, z = len(x), depth[y, x] / 1000
     has_surface = (z > 0) & (view.array("valid")[y, x] > 0)
     y, x, z = y[has_surface], x[has_surface], z[has_surface]
-    rays = intrinsics_of(view.facts).directions(np.stack([x + 0.5, y + 0.5], axis=1))
-    normals = opengl_normals(view)[y, x].astype(np.float64) * [1, -1, -1]
+    rays = view.intrinsics.directions(np.stack([x + 0.5, y + 0.5], axis=1))
+    normals = view.opengl_normals()[y, x].astype(np.float64) * [1, -1, -1]
     return rays * z[:, None], normals, n
 
 

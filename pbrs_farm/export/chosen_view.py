@@ -8,12 +8,13 @@ from __future__ import annotations
 import json
 from dataclasses import dataclass
 from functools import cached_property
-from pathlib import Path
 from typing import Any, Final, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.spatial.transform import Rotation
 
+from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.camera import Intrinsics
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput
@@ -30,7 +31,7 @@ from pbrs_farm.formats.class_map import ClassMap
 from pbrs_farm.formats.layer_file import layer_bytes, layer_from_bytes
 from pbrs_farm.formats.output_folder import OutputHouse, ViewEntry
 from pbrs_farm.images import png_from_array
-from pbrs_farm.regular_files import fault_of, read_regular
+from pbrs_farm.regular_files import read_given
 
 # the picture of a view is the first of these that it has
 PICTURES: Final = (Mode.MLT_IL_OL, Mode.MLT_OL, Mode.OPENGL_IL, Mode.OPENGL_DL)
@@ -38,11 +39,7 @@ PICTURES: Final = (Mode.MLT_IL_OL, Mode.MLT_OL, Mode.OPENGL_IL, Mode.OPENGL_DL)
 _MODES: Final = tuple(str(mode) for mode in Mode)
 _RADIANCE: Final = "radiance"  # nine tenths of a view's bytes: exported only by name
 _Options = TypeVar("_Options", bound=Record)
-_NEEDED: Final = (
-    "width_px",
-    "height_px",
-    "instances",
-)  # fields of view.json needed by every export
+_NEEDED: Final = ("width_px", "height_px", "instances")  # fields of view.json of every export
 _CLASSES: Final = "semantic"  # the layer that a user's classes replace
 # classes of NYU40 for parts of the building; all others are objects
 _STRUCTURE: Final = ("wall", "floor", "ceiling", "door", "window", "otherstructure")
@@ -142,6 +139,23 @@ class ChosenView:
         """
         return next((str(mode) for mode in PICTURES if self.has(mode)), None)
 
+    @property
+    def shown(self) -> bytes:
+        """The file of its picture; BadInput without one."""
+        return self.data(self._required_picture)
+
+    @property
+    def colours(self) -> NDArray[np.uint8]:
+        """(H, W, 3) its picture; BadInput without one."""
+        return np.asarray(self.array(self._required_picture)[..., :3], np.uint8)
+
+    @property
+    def _required_picture(self) -> str:
+        if self.picture is None:
+            hint = "run it with --modes, or export to a format without pictures"
+            raise BadInput(f"{self.house.id}/{self.id}", "", "has no picture", hint=hint)
+        return self.picture
+
     def has(self, name: str) -> bool:
         """True if a layer is exported and the view has it."""
         return self.choice.takes(name) and self.entry.file(LAYER[name].file) is not None
@@ -166,6 +180,86 @@ class ChosenView:
         ]
         return facts | {"instances": rows}
 
+    @property
+    def size(self) -> tuple[int, int]:
+        """Width and height, pixels."""
+        return self.facts["width_px"], self.facts["height_px"]
+
+    @property
+    def intrinsics(self) -> Intrinsics:
+        """Size, K and lens of its camera; `directions` gives the rays of pixels through any lens."""
+        (fx, _skew, cx), (_zero, fy, cy), _last = self.facts["K"]
+        lens = lens_from_table(self.facts["lens"]) if "lens" in self.facts else PINHOLE
+        return Intrinsics(*self.size, fx, fy, cx, cy, lens)
+
+    @property
+    def k_of_whole_centres(self) -> list[list[float]]:
+        """K (3 x 3) for pixels whose centres are whole numbers: the principal point moves by half a pixel.
+
+        For forms whose readers count pixels from their centres, as BOP's and KITTI's; docs/formats/export.md
+        has the convention of each form.
+        """
+        (fx, skew, cx), (_zero, fy, cy), last = self.facts["K"]
+        return [[fx, skew, cx - 0.5], [0.0, fy, cy - 0.5], list(last)]
+
+    @property
+    def pose(self) -> F64:
+        """(4, 4) world_from_camera, camera axes x right, y down, z forward.
+
+        Metres, world y up: p_world = pose @ p_camera.
+        """
+        return np.array(self.facts["world_from_camera_opencv"], np.float64)
+
+    @property
+    def place_and_quaternion(self) -> list[float]:
+        """x y z qx qy qz qw of `pose`, qw not negative."""
+        return place_and_quaternion(self.pose)
+
+    @property
+    def opengl_pose(self) -> F64:
+        """(4, 4) as `pose`, camera axes x right, y up, z backward."""
+        return np.array(self.facts["world_from_camera_opengl"], np.float64)
+
+    def in_world(self, pixels: F64, depth_m: NDArray[np.floating]) -> F64:
+        """(N, 3) world, metres: the points behind pixels (N, 2) at a depth (N,) along the axis."""
+        pose = self.pose
+        local = self.intrinsics.directions(pixels) * depth_m[:, None]
+        return np.asarray(local @ pose[:3, :3].T + pose[:3, 3])
+
+    @property
+    def depth_mm(self) -> NDArray[np.uint16]:
+        """(H, W) mm, 0 for nothing and for 65.535 m or more.
+
+        For forms whose readers take every value above 0 as a measurement.
+        """
+        depth = self.array("depth")
+        return np.where(depth < np.iinfo(np.uint16).max, depth, np.uint16(0))
+
+    @property
+    def depth_m(self) -> F64:
+        """(H, W) metres: of `depth_z` if it is exported, else of depth.png; 0 for nothing or out of its range."""
+        if self.has("depth_z"):
+            return self.array("depth_z").astype(np.float64)
+        return self.depth_mm / 1000
+
+    def opengl_normals(self, layer: str = "normal") -> F32:
+        """(H, W, 3) unit normals, camera x right, y up, z backward; (0, 0, 0) for nothing.
+
+        layer: "normal" or "normal_shading".
+        """
+        published = self.array(layer) * (2 / 65535) - 1
+        local = published @ PUBLISHED_FROM_OPENGL.astype(np.float64)  # columns are OpenGL's axes
+        length = np.linalg.norm(local, axis=-1, keepdims=True)
+        unit = local / np.where(length > 0, length, 1)
+        return np.where((self.array("valid") > 0)[..., None], unit, 0).astype(np.float32)
+
+    @property
+    def opengl_normals_png(self) -> NDArray[np.uint16]:
+        """(H, W, 3) uint16 of `opengl_normals`: round((n + 1) 65535 / 2), 0 for nothing."""
+        normals = self.opengl_normals()
+        has_one = np.asarray(normals != 0).any(-1, keepdims=True)
+        return np.where(has_one, np.rint((normals + 1) / 2 * 65535), 0).astype(np.uint16)
+
     def class_of(self, row: dict[str, Any]) -> int:
         """The class of a row of facts' instances: NYU40's, or the user's; 0 = none."""
         return int(row["nyu40" if self.choice.classes is None else "own_class"])
@@ -174,7 +268,7 @@ class ChosenView:
     def facts_json(self) -> bytes:
         """facts as a file: the stored one unless it is resized or has classes of the user."""
         if self.choice.size is None and self.choice.classes is None:
-            return _view_file(self.entry.folder / "view.json")
+            return read_given(self.entry.folder / "view.json")
         return json.dumps(self.facts, separators=(",", ":")).encode()
 
     def data(self, name: str) -> bytes:
@@ -186,7 +280,7 @@ class ChosenView:
         if name == _CLASSES and self.choice.classes is not None:
             return png_from_array(self.array(name))
         if self.choice.size is None:
-            return _view_file(self.entry.folder / LAYER[name].file)
+            return read_given(self.entry.folder / LAYER[name].file)
         return layer_bytes(name, self.array(name), self.house.attribution)
 
     def array(self, name: str) -> NDArray[Any]:
@@ -197,7 +291,7 @@ class ChosenView:
         if name == _CLASSES and self.choice.classes is not None:
             return self.choice.classes.label(self.array("instance"), self.facts["instances"])
         file = self.entry.folder / LAYER[name].file
-        array = layer_from_bytes(name, _view_file(file), str(file))
+        array = layer_from_bytes(name, read_given(file), str(file))
         return array if self.choice.size is None else resize_layer(name, array, *self.choice.size)
 
     def _resized_facts(self) -> dict[str, Any]:
@@ -217,14 +311,10 @@ class ChosenView:
         return facts
 
 
-def intrinsics_of(facts: dict[str, Any]) -> Intrinsics:
-    """Size, K and lens of a view's camera, from view.json.
-
-    Its `directions` gives the rays of pixels through any lens.
-    """
-    (fx, _skew, cx), (_zero, fy, cy), _last = facts["K"]
-    lens = lens_from_table(facts["lens"]) if "lens" in facts else PINHOLE
-    return Intrinsics(facts["width_px"], facts["height_px"], fx, fy, cx, cy, lens)
+def place_and_quaternion(pose: F64) -> list[float]:
+    """x y z qx qy qz qw of a rigid motion (4, 4), qw not negative."""
+    turn = Rotation.from_matrix(pose[:3, :3]).as_quat(canonical=True)
+    return [*pose[:3, 3].tolist(), *turn.tolist()]
 
 
 def require_lens(view: ChosenView, form: str, *models: str) -> None:
@@ -237,57 +327,6 @@ def require_lens(view: ChosenView, form: str, *models: str) -> None:
     if model not in supported:
         text = f"lens.model {model}: this format supports {', '.join(supported)}"
         raise BadInput(f"--to {form}", view.id, text, hint="another --to")
-
-
-def k_of_whole_centres(k: list[list[float]]) -> list[list[float]]:
-    """K (3 x 3) for pixels whose centres are whole numbers: the principal point moves by half a pixel.
-
-    For forms whose readers count pixels from their centres, as BOP's and KITTI's; docs/formats/export.md
-    has the convention of each form.
-    """
-    (fx, skew, cx), (_zero, fy, cy), last = k
-    return [[fx, skew, cx - 0.5], [0.0, fy, cy - 0.5], list(last)]
-
-
-def depth_within_png(view: ChosenView) -> NDArray[np.uint16]:
-    """(H, W) uint16 mm, 0 for nothing and for 65.535 m or more.
-
-    For forms whose readers take every value above 0 as a measurement.
-    """
-    depth = view.array("depth")
-    return np.where(depth < np.iinfo(np.uint16).max, depth, np.uint16(0))
-
-
-def depth_metres(view: ChosenView) -> NDArray[np.float64]:
-    """(H, W) float64 metres: of `depth_z` if it is exported, else of depth.png; 0 for nothing or out of its range."""
-    if view.has("depth_z"):
-        return view.array("depth_z").astype(np.float64)
-    return depth_within_png(view) / 1000
-
-
-def opengl_normals(view: ChosenView, layer: str = "normal") -> NDArray[np.float32]:
-    """(H, W, 3) unit normals, camera x right, y up, z backward; (0, 0, 0) for nothing.
-
-    layer: "normal" or "normal_shading".
-    """
-    published = view.array(layer) * (2 / 65535) - 1
-    local = published @ PUBLISHED_FROM_OPENGL.astype(np.float64)  # columns are OpenGL's axes
-    length = np.linalg.norm(local, axis=-1, keepdims=True)
-    unit = local / np.where(length > 0, length, 1)
-    return np.where((view.array("valid") > 0)[..., None], unit, 0).astype(np.float32)
-
-
-def opengl_normals_png(view: ChosenView) -> NDArray[np.uint16]:
-    """(H, W, 3) uint16 of `opengl_normals`: round((n + 1) 65535 / 2), 0 for nothing."""
-    normals = opengl_normals(view)
-    has_one = np.asarray(normals != 0).any(-1, keepdims=True)
-    return np.where(has_one, np.rint((normals + 1) / 2 * 65535), 0).astype(np.uint16)
-
-
-def camera_facts(facts: dict[str, Any]) -> dict[str, Any]:
-    """A view's camera in an export: K, its lens unless it is a pin-hole, its pose."""
-    names = ("K", "lens", "depth", "world_from_camera_opencv")
-    return {name: facts[name] for name in names if name in facts}
 
 
 def resize_layer(name: str, array: NDArray[Any], width: int, height: int) -> NDArray[Any]:
@@ -343,10 +382,3 @@ def _instances_in(instance: NDArray[Any], rows: list[dict[str, Any]]) -> list[di
 def _layout_row_at_size(row: dict[str, Any], x: float, y: float) -> dict[str, Any]:
     pixel = row.get("pixel")
     return row if not pixel else row | {"pixel": [pixel[0] * x, pixel[1] * y]}
-
-
-def _view_file(file: Path) -> bytes:
-    try:
-        return read_regular(file)
-    except OSError as error:
-        raise BadInput(file, "", fault_of(error)) from None

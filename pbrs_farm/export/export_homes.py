@@ -14,7 +14,7 @@ from pbrs_farm.export.form import REMARKS, HomeForm, form_names, form_of, option
 from pbrs_farm.export.grasps import GRASPS, grasps_json
 from pbrs_farm.export.home_pieces import ExportedHome, exported_home
 from pbrs_farm.formats.house_bundle import house_from_bundle
-from pbrs_farm.regular_files import MAX_SCENE_BYTES, fault_of, files_below, new_folder, read_regular
+from pbrs_farm.regular_files import MAX_SCENE_BYTES, files_below, new_folder, read_given
 
 
 def export_homes(folder: Path, out: Path, name: str, **options: Any) -> tuple[int, int, list[str]]:
@@ -89,11 +89,5 @@ def stored_house(folder: Path) -> House:
 
     Raises BadInput if a file is damaged, not regular, or larger than the limit for scenes.
     """
-    try:
-        data = {
-            name: read_regular(folder / name, MAX_SCENE_BYTES)
-            for name in ("house.glb", "house.json")
-        }
-    except OSError as error:
-        raise BadInput(folder, "", fault_of(error)) from None
-    return house_from_bundle(data["house.glb"], data["house.json"])
+    files = (folder / name for name in ("house.glb", "house.json"))
+    return house_from_bundle(*(read_given(file, MAX_SCENE_BYTES) for file in files))

@@ -18,7 +18,7 @@ from pbrs_farm.core import keys
 from pbrs_farm.core.checked_calls import as_words, checked_call
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import SPLITS, SplitShares, empty_splits, split_of_house
-from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.chosen_view import Choice, ChosenView, require_lens
 from pbrs_farm.export.form import (
     LEFT_OUT,
     LICENCES,
@@ -30,7 +30,7 @@ from pbrs_farm.export.form import (
 )
 from pbrs_farm.formats.class_map import class_map
 from pbrs_farm.formats.output_folder import ViewEntry, views_of
-from pbrs_farm.regular_files import fault_of, files_below, new_folder, read_regular
+from pbrs_farm.regular_files import files_below, new_folder, read_given
 
 if TYPE_CHECKING:
     from pbrs_farm.views.views import Views
@@ -84,7 +84,7 @@ def export(
         for split, split_entries in by_split.items():
             part = scratch / split
             part.mkdir(exist_ok=True)
-            form.write([ChosenView(v, choice) for v in split_entries], part, choice)
+            write_views(form, [ChosenView(v, choice) for v in split_entries], part, choice)
         if form.finish is not None:
             form.finish(scratch, tuple(filter(None, by_split)), choice)
         licences = sorted({name for v in entries for name in v.facts.get("licences", ())})
@@ -94,6 +94,24 @@ def export(
             with (scratch / REMARKS).open("a", encoding="utf-8") as remarks:
                 remarks.write(f"no home falls into {' and '.join(empty)}: export more homes\n")
         return len(entries), len(files_below(scratch))
+
+
+def write_views(form: ViewForm, views: list[ChosenView], out: Path, choice: Choice) -> None:
+    """Write views in a form, and left_out.txt with those that it does not take, `<house>/<view>: <why>` a line.
+
+    Raises BadInput if it takes none, or if one has a lens that it cannot describe.
+    """
+    takes, taken = form.takes, views if form.takes is None else form.takes.of(views)
+    if takes is not None and not taken:
+        raise BadInput("--to", form.name, takes.none, hint=takes.hint)
+    for view in taken if form.lenses else ():
+        require_lens(view, form.name, *form.lenses)
+    form.write(taken, out, choice)
+    kept = set(map(id, taken))
+    left = [view for view in views if id(view) not in kept]
+    if takes is not None and takes.left_out and left:
+        lines = [f"{view.house.id}/{view.id}: {takes.left_out}\n" for view in left]
+        (out / LEFT_OUT).write_text("".join(lines), "utf-8")
 
 
 def finished_entries(folder: Path, selection: str | None = None) -> list[ViewEntry]:
@@ -179,10 +197,8 @@ def _selected(folder: Path, run: str) -> set[tuple[str, str]]:
         raise BadInput(file, "", "no such selection", hint="run pbrs-farm select")
     try:
         # Each line has the view and `kept`.
-        rows = [json.loads(line) for line in read_regular(file).splitlines()]
+        rows = [json.loads(line) for line in read_given(file).splitlines()]
         return {(row["house"], row["view"]) for row in rows if row["kept"]}
-    except OSError as error:
-        raise BadInput(file, "", fault_of(error)) from None
     except (ValueError, KeyError, TypeError):
         raise BadInput(file, "", "not a selection", hint="run pbrs-farm select") from None
 

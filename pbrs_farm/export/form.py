@@ -55,6 +55,48 @@ class Convention:
 
 
 @dataclass(frozen=True, slots=True)
+class Takes:
+    """The views that a form takes; left_out.txt names the others.
+
+    of: those of a list that it takes. left_out: why the others are not exported, "" = they are not named; the user
+    is told of those whose reason begins with "has no". none, hint: the error if it takes none.
+    """
+
+    of: Callable[[list[ChosenView]], list[ChosenView]]
+    left_out: str
+    none: str
+    hint: str
+
+
+def with_parts(parts: str, *layers: str, hint: str) -> Takes:
+    """Views with a picture and layers; parts: the layers in words."""
+
+    def of(views: list[ChosenView]) -> list[ChosenView]:
+        return [v for v in views if v.picture is not None and all(map(v.has, layers))]
+
+    return Takes(of, f"has no picture or no {parts}", f"no view has a picture and {parts}", hint)
+
+
+PICTURES: Final = Takes(
+    lambda views: [view for view in views if view.picture is not None],
+    "has no picture", "no view has a picture", "run with --modes",
+)  # fmt: skip
+"""Views with a picture."""
+
+
+def frames_with(options: str, *, of_rigs: bool = True) -> Takes:
+    """Frames of sequences, which `pbrs-farm run HOME <options>` makes; of_rigs: those of all cameras of a rig."""
+
+    def of(views: list[ChosenView]) -> list[ChosenView]:
+        frames = [view for view in views if view.facts.get("frame") is not None]
+        return [view for view in frames if of_rigs or not view.shot.eye]
+
+    left = "no frame of a sequence" if of_rigs else "not a film frame of the rig's first camera"
+    none = "no view is a frame of a sequence"
+    return Takes(of, f"is {left}", none, f"pbrs-farm run HOME {options}")
+
+
+@dataclass(frozen=True, slots=True)
 class ViewForm:
     """A form of finished views, written by `pbrs-farm export --to NAME`.
 
@@ -65,15 +107,16 @@ class ViewForm:
         FORM = ViewForm("words", write_words, "`words.tsv`: a line of words a view", options=WordOptions)
 
     name: of --to. write: called with the exported views, an empty folder and the Choice; it raises
-    BadInput for views that the form cannot hold. With --split it is called once for each of train,
-    val and test. help: the files, in Markdown. options: a Record whose fields are options
-    (`core/options.py`), None for a form without. The command line, `Views.export` and the tables of a
-    set's file take them from there; write reads them as `choice.of(WordOptions)`. has_classes: True if
-    user-defined classes can replace NYU40's. finish: called once after all splits with the whole
-    folder, the names of the splits (() without) and the Choice. convention: None if the form defines no
-    pixels, axes or depth. lenses: lens models that it can describe, () for any. layers: a view needs one of
-    them, if any are named. is_of_frames: True if its views are the frames of sequences. reads_radiance: True
-    if it writes less for views without radiance.exr.
+    BadInput for views that the form cannot hold. `content.each_view` makes one of a function that gives the
+    files of a view. With --split it is called once for each of train, val and test. help: the files, in
+    Markdown. options: a Record whose fields are options (`core/options.py`), None for a form without. The
+    command line, `Views.export` and the tables of a set's file take them from there; write reads them as
+    `choice.of(WordOptions)`. has_classes: True if user-defined classes can replace NYU40's. finish: called
+    once after all splits with the whole folder, the names of the splits (() without) and the Choice.
+    convention: None if the form defines no pixels, axes or depth. lenses: lens models that it can describe
+    beside the pin-hole, () for any; a view through another is an error. layers: a view needs one of them, if
+    any are named. is_of_frames: True if its views are the frames of sequences. reads_radiance: True if it
+    writes less for views without radiance.exr. takes: the views that write is called with, None for all.
     """
 
     of: ClassVar[str] = "views"
@@ -89,6 +132,7 @@ class ViewForm:
     layers: tuple[str, ...] = ()
     is_of_frames: bool = False
     reads_radiance: bool = False
+    takes: Takes | None = None
 
 
 @dataclass(frozen=True, slots=True)
@@ -194,30 +238,6 @@ def conventions_table() -> str:
         if convention is not None:
             rows.append(f"| `{name}` | {convention.row} |")
     return "\n".join(rows)
-
-
-def views_with_picture(views: list[ChosenView]) -> list[ChosenView]:
-    """The views that have a picture; BadInput if none has."""
-    shown = [view for view in views if view.picture is not None]
-    if not shown:
-        raise BadInput("--to", "", "no view has a picture", hint="run with --modes")
-    return shown
-
-
-def write_file(file: Path, data: bytes) -> None:
-    """Write a file and the folders above it."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    file.write_bytes(data)
-
-
-def name_left_out(out: Path, views: list[ChosenView], why: str) -> None:
-    """Write left_out.txt, `<house>/<view>: <why>` a line, unless there are no views.
-
-    why: begins with "has no".
-    """
-    if views:
-        lines = [f"{view.house.id}/{view.id}: {why}\n" for view in views]
-        (out / LEFT_OUT).write_text("".join(lines), "utf-8")
 
 
 if __name__ == "__main__":

@@ -1,8 +1,10 @@
-"""Parts that the files of simulators share: z-up axes, numbers as text, XML, names by content. Effects: writes files."""
+"""Parts that the files of simulators share: z-up axes, XML, names by content.
+
+Effects: write_shut_remark writes a file.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Mapping
 from pathlib import Path
 from typing import Final
 from xml.etree import ElementTree as ET
@@ -12,13 +14,13 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.frames import Z_UP_FROM_Y_UP
 from pbrs_farm.export.form import REMARKS
 from pbrs_farm.export.home_pieces import ExportedHome
 from pbrs_farm.geometry.convex_parts import hull_faces
 
 _OPEN: Final = 1e-3  # radians or metres
-Z_UP: Final = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]])
-"""(3, 3): (x, y, z) with y up to (x, -z, y) with z up."""
+Z_UP: Final = Z_UP_FROM_Y_UP[:3, :3]
 
 
 def z_up_points(points: NDArray[np.floating]) -> F64:
@@ -30,11 +32,6 @@ def z_up_pose(world_from_local: F64) -> tuple[F64, F64]:
     """The place (3,) and turn (3, 3) of a frame (4, 4) with y up, in a world with z up."""
     place = z_up_points(world_from_local[None, :3, 3])[0]
     return place, Z_UP @ world_from_local[:3, :3] @ Z_UP.T
-
-
-def numbers(values: Iterable[float]) -> str:
-    """Numbers as the text of an attribute or element."""
-    return " ".join(f"{float(x):.9g}" for x in values)
 
 
 def xml_bytes(root: ET.Element) -> bytes:
@@ -66,10 +63,3 @@ def write_shut_remark(home: ExportedHome, folder: Path) -> None:
     if n_open:
         text = f"{home.house.id}: {n_open} open doors and drawers are shut: the form has no state of joints\n"
         (folder / REMARKS).write_text(text)
-
-
-def write_files(folder: Path, files: Mapping[str, bytes]) -> None:
-    """Write files by their path below a folder."""
-    for name, data in files.items():
-        (folder / name).parent.mkdir(parents=True, exist_ok=True)
-        (folder / name).write_bytes(data)

@@ -13,16 +13,9 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, ItemKind
 from pbrs_farm.export.home_pieces import Lamp, Piece
 from pbrs_farm.formats.glb import GlbWriter
-from pbrs_farm.formats.house_glb import (
-    gltf_asset,
-    gltf_material,
-    item_extras,
-    primitive,
-    write_textures,
-)
+from pbrs_farm.formats.house_glb import gltf_document, item_extras, primitive, write_textures
 
 _LIGHTS = "KHR_lights_punctual"
-_REPEAT = 10497  # OpenGL constant of the repeat wrap mode
 
 
 def glb_of_pieces(
@@ -44,9 +37,7 @@ def glb_of_pieces(
     number = {old: new for new, old in enumerate(used)}
     materials = [house.materials[k] for k in used]
     names = {name for m in materials for name in m.texture_ids}
-    images, all_images = write_textures(
-        writer, {key: t for key, t in house.textures.items() if key in names}
-    )
+    textures = write_textures(writer, {k: t for k, t in house.textures.items() if k in names})
     narrow = replace(house, materials=tuple(materials))
     nodes: list[dict[str, Any]] = []
     meshes: list[dict[str, Any]] = []
@@ -77,20 +68,9 @@ def glb_of_pieces(
                 for k, lamp in enumerate(piece.lamps)
             ]
             lights += [_punctual_light(lamp) for lamp in piece.lamps]
-    scene: dict[str, Any] = {"name": house.name} | ({"nodes": roots} if roots else {})
+    document = gltf_document(narrow, nodes, roots, meshes, textures)
     if rooms is not None:
-        scene["extras"] = {"rooms": rooms}
-    document: dict[str, Any] = {
-        "asset": gltf_asset(house),
-        "scene": 0,
-        "scenes": [scene],
-        "nodes": nodes,
-        "meshes": meshes,
-        "materials": [gltf_material(m, images) for m in materials],
-        "images": [image for image in all_images if "name" in image],
-        "samplers": [{"wrapS": _REPEAT, "wrapT": _REPEAT}] if images else [],
-        "textures": [{"source": i, "sampler": 0} for i in range(len(images))],
-    }
+        document["scenes"][0]["extras"] = {"rooms": rooms}
     if lights:
         document |= {"extensions": {_LIGHTS: {"lights": lights}}, "extensionsUsed": [_LIGHTS]}
     return writer.glb(document)

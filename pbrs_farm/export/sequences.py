@@ -2,16 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Final
 
 import numpy as np
-from numpy.typing import NDArray
 
-from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.chosen_view import ChosenView
 from pbrs_farm.formats.film_mp4 import film_pace
 
@@ -34,15 +31,23 @@ class SequenceFrame:
     @property
     def right(self) -> ChosenView | None:
         """The nearest view to the right of the first with the same rows (a rectified pair); None without one."""
-        camera_from_world = np.linalg.inv(pose_opencv(self.first))
+        camera_from_world = np.linalg.inv(self.first.pose)
         by_distance: dict[float, ChosenView] = {}
         for view in self.others.values():
-            between = camera_from_world @ pose_opencv(view)
+            between = camera_from_world @ view.pose
             aside, between[0, 3] = float(between[0, 3]), 0.0
             same_rows = np.abs(between - np.eye(4)).max() <= _SAME_ROWS
             if same_rows and aside > _SAME_ROWS and view.facts["K"] == self.first.facts["K"]:
                 by_distance[aside] = view
         return by_distance[min(by_distance)] if by_distance else None
+
+
+def by_house(views: Iterable[ChosenView]) -> dict[str, list[ChosenView]]:
+    """House id -> its views, in their order."""
+    houses: dict[str, list[ChosenView]] = {}
+    for view in views:
+        houses.setdefault(view.house.id, []).append(view)
+    return houses
 
 
 def frames_by_house(views: Sequence[ChosenView]) -> dict[str, list[SequenceFrame]]:
@@ -66,44 +71,17 @@ def frames_by_house(views: Sequence[ChosenView]) -> dict[str, list[SequenceFrame
     return {house: sorted(moments, key=order) for house, moments in frames.items()}
 
 
-def films_of(
-    views: Sequence[ChosenView],
-) -> tuple[dict[tuple[str, str], list[ChosenView]], list[ChosenView]]:
-    """(House, camera of a rig, "" for its first) -> the frames of a film in order; and the other views."""
+def films_of(views: Iterable[ChosenView]) -> dict[tuple[str, str], list[ChosenView]]:
+    """(House, camera of a rig, "" for its first) -> the frames of a film in order."""
     films: dict[tuple[str, str], list[ChosenView]] = {}
     for view in views:
-        if view.facts.get("frame") is not None:
-            films.setdefault((view.house.id, view.shot.eye), []).append(view)
+        films.setdefault((view.house.id, view.shot.eye), []).append(view)
     for frames in films.values():
         frames.sort(key=lambda view: int(view.facts["frame"]))
-    return films, [view for view in views if view.facts.get("frame") is None]
+    return films
 
 
 def pace_of(frames: Sequence[ChosenView]) -> Fraction:
     """Frames a second of a film."""
     ends = [(int(v.facts["frame"]), float(v.facts["time_s"])) for v in (frames[0], frames[-1])]
     return film_pace(*ends)
-
-
-def picture_of(view: ChosenView, form: str) -> NDArray[np.uint8]:
-    """(H, W, 3) the view's picture; BadInput as `required_picture`."""
-    return np.asarray(view.array(required_picture(view, form))[..., :3], np.uint8)
-
-
-def pose_opencv(view: ChosenView) -> F64:
-    """(4, 4) float64 world_from_camera, camera axes x right, y down, z forward.
-
-    Metres, world y up: p_world = pose @ p_camera.
-    """
-    return np.array(view.facts["world_from_camera_opencv"], np.float64)
-
-
-def required_picture(view: ChosenView, form: str) -> str:
-    """The mode of the view's picture; BadInput if there is no picture.
-
-    form is the name that the message uses.
-    """
-    if view.picture is None:
-        hint = "run it with --modes, or export to a format without pictures"
-        raise BadInput(f"{view.house.id}/{view.id}", "", f"{form} needs a picture", hint=hint)
-    return view.picture

@@ -13,8 +13,8 @@ from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.joints import Joint, JointKind
+from pbrs_farm.export.content import numbers
 from pbrs_farm.export.home_bodies import Shape, effort_of
-from pbrs_farm.export.home_files import numbers
 
 _MOST_EFFORT, _MOST_SPEED = 100.0, 2.0  # N or N m; m/s or rad/s
 _KINDS: Final = {JointKind.PRISMATIC: "prismatic", JointKind.REVOLUTE: "revolute"}

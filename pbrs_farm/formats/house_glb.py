@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import Any, Final
 
 import numpy as np
@@ -41,22 +41,33 @@ def glb_from_house(house: House) -> bytes:
             meshes.append({"name": item.name or item.id, "primitives": primitives})
         nodes.append(node)
     images, textures = write_textures(writer, house.textures)
+    document = gltf_document(house, nodes, range(len(nodes)), meshes, (images, textures))
+    extras = {"house": house.id, "textures": [x["bufferView"] for x in textures]}
+    return writer.glb(document | {"extras": extras})
+
+
+def gltf_document(
+    house: House,
+    nodes: list[dict[str, Any]],
+    roots: Iterable[int],
+    meshes: list[dict[str, Any]],
+    written: tuple[dict[str, int], list[dict[str, Any]]],
+) -> dict[str, Any]:
+    """The JSON of a file with the materials of a house; roots: nodes of its scene; written: of write_textures."""
+    images, textures = written
     # glTF allows no empty list of nodes.
-    scene = {"name": house.name} | ({"nodes": list(range(len(nodes)))} if nodes else {})
-    return writer.glb(
-        {
-            "asset": gltf_asset(house),
-            "scene": 0,
-            "scenes": [scene],
-            "nodes": nodes,
-            "meshes": meshes,
-            "materials": [gltf_material(m, images) for m in house.materials],
-            "images": [image for image in textures if "name" in image],
-            "samplers": [{"wrapS": _REPEAT, "wrapT": _REPEAT}] if images else [],
-            "textures": [{"source": i, "sampler": 0} for i in range(len(images))],
-            "extras": {"house": house.id, "textures": [x["bufferView"] for x in textures]},
-        }
-    )
+    scene = {"name": house.name} | ({"nodes": [*roots]} if nodes else {})
+    return {
+        "asset": gltf_asset(house),
+        "scene": 0,
+        "scenes": [scene],
+        "nodes": nodes,
+        "meshes": meshes,
+        "materials": [gltf_material(m, images) for m in house.materials],
+        "images": [image for image in textures if "name" in image],
+        "samplers": [{"wrapS": _REPEAT, "wrapT": _REPEAT}] if images else [],
+        "textures": [{"source": i, "sampler": 0} for i in range(len(images))],
+    }
 
 
 def gltf_asset(house: House) -> dict[str, Any]:

@@ -1,6 +1,6 @@
 """The layout of the Hypersim data set (Roberts et al. 2021): names of its files, cameras, HDF5, tone.
 
-Effects: read_dataset and write_dataset read and write a file. The writer of the layout is
+Effects: read_dataset reads a file. The writer of the layout is
 export/forms/hypersim.py, the reader views/hypersim_folder.py.
 
 Its world has z up, its camera's axes are x right, y up, z backward. (u, v) go over the picture from
@@ -9,6 +9,8 @@ Its world has z up, its camera's axes are x right, y up, z backward. (u, v) go o
 
 from __future__ import annotations
 
+import csv
+from io import BytesIO
 from pathlib import Path
 from typing import Any, Final
 
@@ -17,8 +19,9 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.camera import Intrinsics
-from pbrs_farm.core.errors import BadInput, MachineFailed
-from pbrs_farm.installation import install_command
+from pbrs_farm.core.errors import BadInput
+from pbrs_farm.core.frames import Z_UP_FROM_Y_UP
+from pbrs_farm.installation import need
 
 SPLIT_CSV: Final = "metadata_images_split_scene_v1.csv"
 CAMERAS_CSV: Final = "metadata_camera_parameters.csv"
@@ -27,7 +30,7 @@ HEIGHT_PX: Final = 768
 FOCAL_PX: Final = 886.8100134752651
 """Default of readers that ignore CAMERAS_CSV: 60 degrees across 1024 pixels."""
 
-Z_UP_FROM_Y_UP: Final[F64] = np.array([[1.0, 0, 0], [0, 0, -1], [0, 1, 0]], np.float64)
+Z_UP: Final[F64] = Z_UP_FROM_Y_UP[:3, :3]
 """Its world from ours."""
 
 _NEAR, _FAR = 1.0, 1000.0  # of M_proj
@@ -107,27 +110,32 @@ def preview(colour: F32, has_surface: NDArray[np.bool_]) -> NDArray[np.uint8]:
     return np.rint(255 * shown).astype(np.uint8)
 
 
-def write_dataset(file: Path, array: NDArray[Any]) -> None:
+def table_rows(file: Path) -> list[dict[str, str]]:
+    """The rows of one of its tables; [] without the file."""
+    if not file.is_file():
+        return []
+    with file.open(encoding="utf-8", newline="") as opened:
+        return list(csv.DictReader(opened))
+
+
+def dataset_bytes(array: NDArray[Any]) -> bytes:
     """An HDF5 file of one compressed data set, `dataset`. Raises MachineFailed without h5py."""
-    file.parent.mkdir(parents=True, exist_ok=True)
-    with _h5py().File(file, "w") as opened:
+    data = BytesIO()
+    need("h5py")
+    import h5py
+
+    with h5py.File(data, "w") as opened:
         opened.create_dataset("dataset", data=array, compression="gzip")
+    return data.getvalue()
 
 
 def read_dataset(file: Path) -> NDArray[Any]:
     """The array of an HDF5 file's `dataset`; BadInput without one, MachineFailed without h5py."""
-    h5py = _h5py()
+    need("h5py")
+    import h5py
+
     try:
         with h5py.File(file, "r") as opened:
             return np.asarray(opened["dataset"][...])
     except (OSError, KeyError, ValueError, TypeError) as error:
         raise BadInput(file, "dataset", f"is not a data set of HDF5: {error}"[:200]) from None
-
-
-def _h5py() -> Any:
-    try:
-        import h5py
-    except ImportError:
-        hint = install_command("selection")
-        raise MachineFailed("Hypersim's files need h5py", hint=hint) from None
-    return h5py

@@ -6,7 +6,6 @@ Hypersim's own tone mapping; depth along rays becomes planar, the world gets y u
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Callable, Mapping, Sequence
 from functools import cached_property
@@ -29,7 +28,7 @@ from pbrs_farm.core.frames import (
 from pbrs_farm.core.house_split import SplitShares, split_of_house
 from pbrs_farm.formats import hypersim
 from pbrs_farm.images import decode_photo
-from pbrs_farm.regular_files import fault_of, read_regular
+from pbrs_farm.regular_files import read_given
 from pbrs_farm.views.stored_layers import ViewFacts, array_names, check_array, sample_of_stored
 from pbrs_farm.views.view_sample import Sample, SampleRequest
 from pbrs_farm.views.views import ViewRef, Views
@@ -39,18 +38,6 @@ _FRAME: Final = re.compile(r"frame\.(\d{4})\.depth_meters\.hdf5")
 _MODE: Final = "mlt_il_ol"  # mode of its pictures: all light
 _DEPTH_MAX_MM: Final = 65535
 _TILTED: Final = "a tilted projection, which K cannot describe"
-_LAYER_FILES: Final = {
-    "depth": "depth_meters",
-    "depth_z": "depth_meters",
-    "position": "position",
-    "normal": "normal_cam",
-    "valid": "normal_cam",
-    "normal_shading": "normal_bump_cam",
-    "semantic": "semantic",
-    "instance": "semantic_instance",
-    "albedo": "diffuse_reflectance",
-}
-"""Layer of core/layers.py -> its file in a frame."""
 
 
 class HypersimFolder:
@@ -79,11 +66,14 @@ class HypersimFolder:
     @cached_property
     def _rows(self) -> dict[str, Mapping[str, str]]:
         """Scene -> its row of the camera parameters; {} for a folder without the table."""
-        return {row["scene_name"]: row for row in _table(self._folder / hypersim.CAMERAS_CSV)}
+        return {
+            row["scene_name"]: row
+            for row in hypersim.table_rows(self._folder / hypersim.CAMERAS_CSV)
+        }
 
     @cached_property
     def _splits(self) -> dict[ViewRef, Mapping[str, str]]:
-        rows = _table(self._folder / hypersim.SPLIT_CSV)
+        rows = hypersim.table_rows(self._folder / hypersim.SPLIT_CSV)
         return {
             ViewRef(r["scene_name"], f"{r['camera_name']}_{int(r['frame_id']):04d}"): r
             for r in rows
@@ -153,7 +143,7 @@ class HypersimFolder:
         return sample_of_stored(facts, arrays, request)
 
     def layers(self, ref: ViewRef) -> tuple[str, ...]:
-        has = [n for n, file in _LAYER_FILES.items() if self._file(ref, file).is_file()]
+        has = [n for n, (file, _of) in _LAYERS.items() if self._file(ref, file).is_file()]
         return (*self.modes(ref), *has, *(("boundary",) if "instance" in has else ()))
 
     def layer(self, ref: ViewRef, name: str) -> NDArray[Any]:
@@ -166,8 +156,8 @@ class HypersimFolder:
             from pbrs_farm.truth.boundary import instance_boundary
 
             return instance_boundary(self.layer(ref, "instance"))
-        stored = self._stored(ref, _LAYER_FILES[name])
-        return _LAYER_OF[name](stored, self._intrinsics_of(ref), self._metres(ref.house))
+        file, pixels_of = _LAYERS[name]
+        return pixels_of(self._stored(ref, file), self._intrinsics_of(ref), self._metres(ref.house))
 
     def kept_by(self, run: str) -> frozenset[ViewRef]:
         raise BadInput(self.url, "", f"a Hypersim folder has no selection {run}")
@@ -204,10 +194,7 @@ class HypersimFolder:
     def _colour(self, ref: ViewRef) -> NDArray[np.uint8]:
         preview = self._preview(ref)
         if preview.is_file():
-            try:
-                return decode_photo(read_regular(preview), str(preview))
-            except OSError as error:
-                raise BadInput(preview, "", fault_of(error)) from None
+            return decode_photo(read_given(preview), str(preview))
         has_surface = np.isfinite(self._stored(ref, "depth_meters"))
         colour = self._stored(ref, "color").astype(np.float32)
         return hypersim.preview(np.nan_to_num(colour), has_surface)
@@ -219,7 +206,7 @@ class HypersimFolder:
 
     def _metres(self, scene: str) -> float:
         file = self._folder / scene / "_detail/metadata_scene.csv"
-        rows = {row["parameter_name"]: list(row.values())[1] for row in _table(file)}
+        rows = {row["parameter_name"]: list(row.values())[1] for row in hypersim.table_rows(file)}
         try:
             return float(rows["meters_per_asset_unit"])
         except (KeyError, ValueError):
@@ -238,7 +225,7 @@ class HypersimFolder:
         positions, orientations = self._poses[key]
         if frame >= len(positions) or orientations.shape != (len(positions), 3, 3):
             raise BadInput(folder, "", f"{len(positions)} poses, and a frame {frame}")
-        turn = hypersim.Z_UP_FROM_Y_UP.T
+        turn = hypersim.Z_UP.T
         place = turn @ positions[frame] * self._metres(ref.house)
         return np.asarray(affine(turn @ orientations[frame], place) @ OPENCV_FROM_OPENGL)
 
@@ -269,19 +256,12 @@ def _intrinsics(row: Mapping[str, str]) -> Intrinsics | None:
     return hypersim.intrinsics_of_uv(np.array(matrix), width, height)
 
 
-def _table(file: Path) -> list[dict[str, str]]:
-    if not file.is_file():
-        return []
-    with file.open(encoding="utf-8", newline="") as opened:
-        return list(csv.DictReader(opened))
-
-
 def _layer_of_array(name: str) -> str:
     return {"class40": "semantic"}.get(name, name)
 
 
 def _file_of_array(name: str) -> str:
-    return _LAYER_FILES[_layer_of_array(name)]
+    return _LAYERS[_layer_of_array(name)][0]
 
 
 def _planar(stored: NDArray[Any], i: Intrinsics, _metres: float) -> NDArray[np.float32]:
@@ -297,7 +277,7 @@ def _millimetres(stored: NDArray[Any], i: Intrinsics, metres: float) -> NDArray[
 
 
 def _position(stored: NDArray[Any], _i: Intrinsics, metres: float) -> NDArray[np.float32]:
-    world = stored.astype(np.float64) @ hypersim.Z_UP_FROM_Y_UP * metres
+    world = stored.astype(np.float64) @ hypersim.Z_UP * metres
     return world.astype(np.float32)
 
 
@@ -334,17 +314,18 @@ def _albedo(stored: NDArray[Any], _i: Intrinsics, _metres: float) -> NDArray[np.
 
 
 _LayerOf = Callable[[NDArray[Any], Intrinsics, float], NDArray[Any]]
-_LAYER_OF: Final[Mapping[str, _LayerOf]] = {
-    "depth": _millimetres,
-    "depth_z": _planar,
-    "position": _position,
-    "normal": _normal,
-    "normal_shading": _normal,
-    "valid": _valid,
-    "semantic": _class40,
-    "instance": _instance,
-    "albedo": _albedo,
+_LAYERS: Final[Mapping[str, tuple[str, _LayerOf]]] = {
+    "depth": ("depth_meters", _millimetres),
+    "depth_z": ("depth_meters", _planar),
+    "position": ("position", _position),
+    "normal": ("normal_cam", _normal),
+    "valid": ("normal_cam", _valid),
+    "normal_shading": ("normal_bump_cam", _normal),
+    "semantic": ("semantic", _class40),
+    "instance": ("semantic_instance", _instance),
+    "albedo": ("diffuse_reflectance", _albedo),
 }
+"""Layer of core/layers.py -> its file in a frame, and its pixels from that."""
 
 
 def is_hypersim(folder: Path) -> bool:

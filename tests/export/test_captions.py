@@ -1,19 +1,18 @@
 """Captions against hand-made answers: counts, relations of boxes, a real view."""
 
 import json
-from types import SimpleNamespace
-from typing import cast
 
 import numpy as np
 import pytest
 
 import pbrs_farm as pf
-from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.chosen_view import Choice
 from pbrs_farm.export.export_views import export
 from pbrs_farm.export.forms.captions import caption
 from pbrs_farm.export.nouns import counted, plural
 from pbrs_farm.formats.class_map import ClassMap, ClassRule
 from pbrs_farm.formats.output_folder import OutputHouse, RoomOutline
+from tests.inputs.made_views import made_view
 from tests.scene.homes import small_home
 
 # Camera axes are x right, y down, z forward; the world is y up: turn about x.
@@ -37,11 +36,8 @@ def view_of(*rows: dict, room: str = "Bedroom", classes: ClassMap | None = None,
         "width_px": 100, "height_px": 80, "K": [[50, 0, 50], [0, 50, 40], [0, 0, 1]],
         "world_from_camera_opencv": WORLD_FROM_CAMERA.tolist(), "instances": list(rows), **facts,
     }  # fmt: skip
-    view = SimpleNamespace(
-        facts=table, choice=Choice(classes=classes), id="v",
-        house=OutputHouse("h", "h", "", {"0_0": room}), entry=SimpleNamespace(room_id="0_0"),
-    )  # fmt: skip
-    return cast(ChosenView, view)
+    house = OutputHouse("h", "h", "", {"0_0": room})
+    return made_view(table, choice=Choice(classes=classes), house=house, room_id="0_0")
 
 
 def text(*rows: dict, **fields) -> str:
@@ -117,8 +113,8 @@ def test_the_caption_names_the_visible_room(left_m, right_m, said):
     depth = np.full((80, 100), right_m * 1000, np.uint16)
     depth[:, :60] = left_m * 1000
     view = view_of(K=[[250, 0, 50], [0, 250, 40], [0, 0, 1]])
-    view.house = OutputHouse("h", "h", "", rooms, places)
-    view.array = {"depth": depth}.get
+    vars(view.entry)["house"] = OutputHouse("h", "h", "", rooms, places)
+    vars(view)["array"] = {"depth": depth}.get
     assert caption(view)["text"] == f"The picture shows {said}."
 
 

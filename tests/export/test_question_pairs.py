@@ -2,8 +2,7 @@
 
 import json
 from dataclasses import replace
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -15,13 +14,13 @@ from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import LightPart
 from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.core.lighting import PowerUnit
-from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.export_views import export
 from pbrs_farm.export.questions.asking import Question
 from pbrs_farm.export.questions.clips import Clip, Thing
 from pbrs_farm.export.questions.kinds import KINDS
 from pbrs_farm.export.questions.pairs import HIDDEN, pair_questions
 from tests.inputs.asked_clips import clip_of, drafts, house_of, visible_item
+from tests.inputs.made_views import made_view
 
 
 def picture(
@@ -38,8 +37,8 @@ def picture(
         "width_px": 100, "height_px": 100, "K": [[50, 0, 50], [0, 50, 50], [0, 0, 1]], "room": room,
         "world_from_camera_opencv": pose.tolist(), "instances": [{"id": t.instance, "box2d": column_of(t, eye)} for t in things],
     }  # fmt: skip
-    view = SimpleNamespace(facts=facts, id=name, choice=Choice(), picture="mlt_il_ol")
-    return Clip(name, [cast(ChosenView, view)], house, things)
+    view = made_view(facts, id=name, file={"mlt_il_ol.png": "mlt_il_ol.png"}.get)
+    return Clip(name, [view], house, things)
 
 
 def column_of(thing: Thing, eye: Any) -> list[float]:
@@ -103,7 +102,7 @@ def test_which_of_two_lamps_is_on_is_not_a_matter_of_brightness() -> None:
     assert asked("pair_lamp", left, picture("both", *lamps(800, 800))) == []
     assert asked("pair_lamp", left, picture("three", *lamps(0, 800, 0))) == []
     # Daylight and a headlight do not show lamps.
-    cast(Any, right.views[0]).picture = "opengl_dl"
+    vars(right.views[0].entry)["file"] = {"opengl_dl.png": "opengl_dl.png"}.get
     assert asked("pair_lamp", left, right) == []
 
 
@@ -208,8 +207,8 @@ def walk(*xs: float) -> Clip:
     for x in xs:
         pose = np.eye(4)
         pose[:3, 3] = (x, 1.5, 1.0)
-        views.append(SimpleNamespace(facts={"world_from_camera_opencv": pose.tolist()}))
-    return replace(clip, views=cast(Any, views))
+        views.append(made_view({"world_from_camera_opencv": pose.tolist()}))
+    return replace(clip, views=views)
 
 
 def test_a_walk_that_returns_to_a_room_visits_it_twice() -> None:

@@ -6,7 +6,7 @@ import math
 from collections.abc import Iterator
 from dataclasses import replace
 from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pyarrow.parquet as pq
@@ -15,7 +15,7 @@ import pytest
 import pbrs_farm as pf
 from pbrs_farm.check.question_checks import wrong_answers
 from pbrs_farm.core.house import MaterialKind
-from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.chosen_view import ChosenView
 from pbrs_farm.export.export_views import export, remarks_of
 from pbrs_farm.export.nouns import noun_of
 from pbrs_farm.export.questions import asking, clips
@@ -24,6 +24,7 @@ from pbrs_farm.export.questions.clips import Clip, Thing, is_countable
 from pbrs_farm.export.questions.kinds import Draft, QuestionKind, bearing_deg
 from pbrs_farm.export.questions.references import references_of
 from tests.inputs.asked_clips import ROOM_M, clip_of, drafts, house_of, visible_item
+from tests.inputs.made_views import made_view
 
 
 def test_distance_is_between_the_nearest_places_of_the_meshes():
@@ -101,7 +102,7 @@ def view_of_wall(cx: float, row: Any = None) -> ChosenView:
         "width_px": 100, "height_px": 100, "K": [[50, 0, cx], [0, 50, 50], [0, 0, 1]],
         "world_from_camera_opencv": pose.tolist(), "instances": [row] if row else [],
     }  # fmt: skip
-    return cast(ChosenView, SimpleNamespace(facts=facts, choice=SimpleNamespace(classes=None)))
+    return made_view(facts)
 
 
 def test_an_item_cut_by_the_edge_of_the_picture_is_not_visible():
@@ -327,14 +328,13 @@ def test_a_phrase_names_the_colour_of_a_coloured_item(kind, rgb, colour):
         "instance": np.ones((10, 10), np.uint16),
         "albedo": np.full((10, 10, 3), rgb, np.uint8),
     }
-    view = SimpleNamespace(
-        facts=clip.views[0].facts, array=layers.__getitem__, choice=Choice(),
-        entry=SimpleNamespace(file=lambda name: name if name == "albedo.png" else None),
-    )  # fmt: skip
+    view = made_view(
+        clip.views[0].facts,
+        array=layers.__getitem__,
+        file=lambda name: name if name == "albedo.png" else None,
+    )
     house = replace(clip.house, materials=[replace(m, kind=kind) for m in clip.house.materials])
-    phrases = {
-        r.phrase for r in references_of(Clip("clip", [cast(ChosenView, view)], house, clip.things))
-    }
+    phrases = {r.phrase for r in references_of(Clip("clip", [view], house, clip.things))}
     assert phrases == {"the cabinet"} | ({f"the {colour} cabinet"} if colour else set())
 
 

@@ -2,8 +2,7 @@
 
 import json
 from pathlib import Path
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 import pytest
@@ -21,6 +20,7 @@ from pbrs_farm.run.local_run import Run
 from pbrs_farm.run.plan import wanted
 from pbrs_farm.sample.walks.trajectory_file import poses_from_tum
 from tests.check.roots import make_root
+from tests.inputs.made_views import made_view
 
 LAYERS = ["flow_forward", "occlusion_forward", "disparity", "occlusion_stereo"]
 
@@ -199,7 +199,7 @@ def test_forms_name_the_lens_or_refuse_it() -> None:
     cube = {"model": "cubemap"}
 
     def view_through(lens: dict[str, Any]) -> ChosenView:
-        return cast(ChosenView, SimpleNamespace(id="a", facts=facts | {"lens": lens}))
+        return made_view(facts | {"lens": lens}, id="a")
 
     bent, strip = view_through(radtan), view_through(cube)
     assert (

@@ -4,8 +4,6 @@ from __future__ import annotations
 
 import pickle
 from pathlib import Path
-from types import SimpleNamespace
-from typing import cast
 
 import numpy as np
 import pytest
@@ -13,11 +11,11 @@ from PIL import Image
 
 import pbrs_farm as pf
 from pbrs_farm.core.recipe import recipe_from_name
-from pbrs_farm.export.chosen_view import ChosenView
 from pbrs_farm.formats.output_folder import views_of
 from pbrs_farm.images import array_from_png
 from pbrs_farm.run.plan import check_layers
 from pbrs_farm.run.request import Wanted
+from tests.inputs.made_views import made_view
 from tests.scene.homes import small_home
 
 SIZE = (64, 48)
@@ -139,10 +137,7 @@ def test_a_point_behind_the_camera_has_the_place_of_the_nearest_frame() -> None:
 
     facts = {"width_px": 4, "height_px": 4, "K": [[2, 0, 2], [0, 2, 2], [0, 0, 1]]}
     pose = np.eye(4)
-    frames = [
-        cast(ChosenView, SimpleNamespace(facts=facts | {"world_from_camera_opencv": pose.tolist()}))
-        for _ in range(3)
-    ]
+    frames = [made_view(facts | {"world_from_camera_opencv": pose.tolist()}) for _ in range(3)]
     depth = np.array([[1, 0, 3], [0, 0, 5]], np.float32)
     places = places_of_tracks(np.full((2, 3, 2), 2.0), depth, frames)
     np.testing.assert_allclose(places[..., 2], [[1, 1, 3], [5, 5, 5]])

@@ -1,15 +1,14 @@
 """Clips of boxes in a room, about which questions are asked."""
 
 import random
-from types import SimpleNamespace
-from typing import Any, cast
+from typing import Any
 
 import numpy as np
 
 from pbrs_farm.core.house import House, Item
-from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.questions.clips import Clip, Thing
 from pbrs_farm.export.questions.kinds import KINDS
+from tests.inputs.made_views import made_view
 from tests.sample.sampled_rooms import box, room_house
 
 KIND = {kind.name: kind for kind in KINDS}
@@ -38,11 +37,9 @@ def clip_of(*things: Thing, frames: int = 1, eye=(1.0, 1.5, 1.0), facts: Any = N
     table = {"world_from_camera_opencv": pose.tolist(), "instances": [], "width_px": 100} | (
         facts or {}
     )
-    view = SimpleNamespace(
-        facts=table, entry=SimpleNamespace(file=lambda _name: None), choice=Choice()
-    )
+    view = made_view(table)
     house = house_of(*(t.item for t in things))
-    return Clip("clip", [cast(ChosenView, view)] * frames, house, things)
+    return Clip("clip", [view] * frames, house, things)
 
 
 def drafts(kind: str, clip: Clip):

@@ -11,7 +11,6 @@ first pixel. `mask` is the model alone, as rays at pixel centres meet its triang
 
 from __future__ import annotations
 
-import json
 import re
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,23 +22,23 @@ from scipy.spatial import ConvexHull, QhullError
 from scipy.spatial.distance import pdist
 
 from pbrs_farm.core.arrays import F64, I32
-from pbrs_farm.core.camera import Camera, Intrinsics
+from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.cutouts import CutOuts
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import House, Item
-from pbrs_farm.export.chosen_view import Choice, ChosenView, k_of_whole_centres, require_lens
+from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.content import Content, Files, write_files
 from pbrs_farm.export.export_homes import stored_house
 from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.export.masks import compressed_runs
-from pbrs_farm.images import png_from_array
+from pbrs_farm.export.sequences import by_house
+from pbrs_farm.formats.ply import ply_bytes, records_of
 from pbrs_farm.raycast.caster import cut_outs_of_house
 from pbrs_farm.truth.coverage import coverage
 
 _SPLIT: Final = "train_pbr"
 _MM: Final = 1000.0
 _OWN_NUMBER: Final = re.compile(r"obj[_-]0*([1-9]\d{0,5})")
-_VERTEX: Final = np.dtype([("xyz", "<f4", 3), ("rgb", "u1", 3)])
-_FACE: Final = np.dtype([("n", "u1"), ("corners", "<i4", 3)])
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -68,15 +67,10 @@ def write_bop(views: list[ChosenView], out: Path, _choice: Choice) -> None:
         hint = "place or scatter models first: docs/python.md"
         raise BadInput("--to bop", "", "no home of these views has a placed model", hint=hint)
     numbers = _object_numbers(sorted(meshes))
-    _write_models(out / "models", meshes, numbers)
-    scenes: dict[str, list[ChosenView]] = {}
-    for view in views:
-        require_lens(view, "bop", *FORM.lenses)
-        scenes.setdefault(view.house.id, []).append(view)
-    for scene, (house_id, house_views) in enumerate(scenes.items()):
+    write_files(out, [{"camera.json": _camera_json(views[0])}, _model_files(meshes, numbers)])
+    for scene, (house_id, house_views) in enumerate(by_house(views).items()):
         folder = out / _SPLIT / f"{scene:06d}"
         _write_scene(folder, house_views, houses[house_id], numbers)
-    _write_json(out / "camera.json", _camera_json(views[0]))
 
 
 def _object_numbers(models: list[str]) -> dict[str, int]:
@@ -104,12 +98,12 @@ def _mesh_of(item: Item, house: House) -> _ModelMesh:
     return _ModelMesh(local * _MM, np.concatenate(faces).astype(np.int32), np.concatenate(rgb))
 
 
-def _write_models(folder: Path, meshes: dict[str, _ModelMesh], numbers: dict[str, int]) -> None:
-    folder.mkdir(parents=True)
+def _model_files(meshes: dict[str, _ModelMesh], numbers: dict[str, int]) -> Files:
+    files: dict[str, Content] = {}
     info = {}
     for model, number in sorted(numbers.items(), key=lambda pair: pair[1]):
         mesh = meshes[model]
-        (folder / f"obj_{number:06d}.ply").write_bytes(_ply(mesh))
+        files[f"models/obj_{number:06d}.ply"] = _ply(mesh)
         low, size = mesh.points.min(0), np.ptp(mesh.points, axis=0)
         info[str(number)] = {
             "diameter": _diameter(mesh.points),
@@ -117,7 +111,7 @@ def _write_models(folder: Path, meshes: dict[str, _ModelMesh], numbers: dict[str
             **{f"min_{axis}": float(v) for axis, v in zip("xyz", low)},
             **{f"size_{axis}": float(v) for axis, v in zip("xyz", size)},
         }
-    _write_json(folder / "models_info.json", info)
+    return files | {"models/models_info.json": info}
 
 
 def _diameter(points: F64) -> float:
@@ -130,17 +124,11 @@ def _diameter(points: F64) -> float:
 
 
 def _ply(mesh: _ModelMesh) -> bytes:
-    vertices = np.empty(len(mesh.points), _VERTEX)
-    vertices["xyz"], vertices["rgb"] = mesh.points, mesh.rgb
-    faces = np.empty(len(mesh.faces), _FACE)
-    faces["n"], faces["corners"] = 3, mesh.faces
-    colours = "".join(f"property uchar {name}\n" for name in ("red", "green", "blue"))
-    head = (
-        "ply\nformat binary_little_endian 1.0\n"
-        f"element vertex {len(vertices)}\nproperty float x\nproperty float y\nproperty float z\n{colours}"
-        f"element face {len(faces)}\nproperty list uchar int vertex_indices\nend_header\n"
-    )
-    return head.encode() + vertices.tobytes() + faces.tobytes()
+    columns: dict[str, NDArray[Any]] = {
+        **dict(zip("xyz", mesh.points.astype(np.float32).T, strict=True)),
+        **dict(zip(("red", "green", "blue"), mesh.rgb.T, strict=True)),
+    }
+    return ply_bytes(records_of(columns), triangles=mesh.faces)
 
 
 def _write_scene(
@@ -149,30 +137,26 @@ def _write_scene(
     for name in ("rgb", "depth", "mask", "mask_visib"):
         (folder / name).mkdir(parents=True)
     cut_outs = cut_outs_of_house(house)
-    camera: dict[str, Any] = {}
-    poses: dict[str, Any] = {}
-    info: dict[str, Any] = {}
-    coco: dict[str, list[Any]] = {
-        "images": [],
-        "annotations": [],
-        "categories": [{"id": n, "name": m, "supercategory": "bop"} for m, n in numbers.items()],
+    documents: dict[str, dict[str, Any]] = {
+        name: {} for name in ("scene_camera", "scene_gt", "scene_gt_info", "scene_gt_coco")
     }
+    camera, poses, info, coco = documents.values()
+    categories = [{"id": n, "name": m, "supercategory": "bop"} for m, n in numbers.items()]
+    coco |= {"images": [], "annotations": [], "categories": categories}
     for image, view in enumerate(views):
-        if view.picture is not None:
-            (folder / "rgb" / f"{image:06d}.png").write_bytes(view.data(view.picture))
-        (folder / "depth" / f"{image:06d}.png").write_bytes(view.data("depth"))
         rows = [row for row in view.facts["instances"] if row.get("model") in numbers]
         camera[str(image)] = _scene_camera(view)
         poses[str(image)] = [_pose_row(row, numbers) for row in rows]
         info[str(image)] = []
-        size = view.facts["width_px"], view.facts["height_px"]
-        file = f"rgb/{image:06d}.png"
-        coco["images"].append({"id": image, "file_name": file, "width": size[0], "height": size[1]})
+        files: dict[str, Content] = {f"depth/{image:06d}.png": view.data("depth")}
+        if view.picture is not None:
+            files[f"rgb/{image:06d}.png"] = view.shown
+        size = dict(zip(("width", "height"), view.size, strict=True))
+        coco["images"].append({"id": image, "file_name": f"rgb/{image:06d}.png", **size})
         for k, row in enumerate(rows):
             alone, visible = _masks(view, house.items[row["id"] - 1], row["id"], cut_outs)
             for name, mask in (("mask", alone), ("mask_visib", visible)):
-                png = png_from_array(mask.astype(np.uint8) * np.uint8(255))
-                (folder / name / f"{image:06d}_{k:06d}.png").write_bytes(png)
+                files[f"{name}/{image:06d}_{k:06d}.png"] = mask.astype(np.uint8) * np.uint8(255)
             facts = _mask_facts(alone, visible, view.array("depth") > 0)
             info[str(image)].append(facts)
             coco["annotations"].append(
@@ -185,28 +169,18 @@ def _write_scene(
                     "area": facts["px_count_visib"],
                     "bbox": facts["bbox_visib"],
                     "segmentation": compressed_runs(visible),
-                    "width": size[0],
-                    "height": size[1],
+                    **size,
                 }
             )
-    files = {
-        "scene_camera": camera,
-        "scene_gt": poses,
-        "scene_gt_info": info,
-        "scene_gt_coco": coco,
-    }
-    for name, document in files.items():
-        _write_json(folder / f"{name}.json", document)
+        write_files(folder, [files])
+    write_files(folder, [{f"{name}.json": document for name, document in documents.items()}])
 
 
 def _masks(
     view: ChosenView, item: Item, instance: int, cut_outs: CutOuts
 ) -> tuple[NDArray[Any], NDArray[Any]]:
     """(H, W) bool masks of the item alone, and of its visible part."""
-    facts = view.facts
-    (fx, _skew, cx), (_zero, fy, cy), _last = facts["K"]
-    intrinsics = Intrinsics(facts["width_px"], facts["height_px"], fx, fy, cx, cy)
-    camera = Camera(intrinsics, np.array(facts["world_from_camera_opengl"]))
+    camera = Camera(view.intrinsics, view.opengl_pose)
     visible = view.array("instance") == instance
     return coverage(item, camera, cut_outs) | visible, visible
 
@@ -242,9 +216,9 @@ def _pose_row(row: dict[str, Any], numbers: dict[str, int]) -> dict[str, Any]:
 
 
 def _scene_camera(view: ChosenView) -> dict[str, Any]:
-    camera_from_world = np.linalg.inv(np.array(view.facts["world_from_camera_opencv"]))
+    camera_from_world = np.linalg.inv(view.pose)
     return {
-        "cam_K": [v for line in k_of_whole_centres(view.facts["K"]) for v in line],
+        "cam_K": [v for line in view.k_of_whole_centres for v in line],
         "depth_scale": 1.0,
         "cam_R_w2c": camera_from_world[:3, :3].ravel().tolist(),
         "cam_t_w2c": (camera_from_world[:3, 3] * _MM).tolist(),
@@ -252,21 +226,10 @@ def _scene_camera(view: ChosenView) -> dict[str, Any]:
 
 
 def _camera_json(view: ChosenView) -> dict[str, Any]:
-    (fx, _skew, cx), (_zero, fy, cy), _last = k_of_whole_centres(view.facts["K"])
-    width, height = view.facts["width_px"], view.facts["height_px"]
-    return {
-        "fx": fx,
-        "fy": fy,
-        "cx": cx,
-        "cy": cy,
-        "width": width,
-        "height": height,
-        "depth_scale": 1.0,
-    }
-
-
-def _write_json(path: Path, document: Any) -> None:
-    path.write_text(json.dumps(document, indent=1) + "\n", "utf-8")
+    (fx, _skew, cx), (_zero, fy, cy), _last = view.k_of_whole_centres
+    width, height = view.size
+    named = {"fx": fx, "fy": fy, "cx": cx, "cy": cy, "width": width, "height": height}
+    return named | {"depth_scale": 1.0}
 
 
 FORM = ViewForm(

@@ -11,9 +11,8 @@ from __future__ import annotations
 import json
 from collections import Counter
 from collections.abc import Iterable, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import combinations
-from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
@@ -21,10 +20,10 @@ import shapely
 
 from pbrs_farm.core.arrays import F64, Mask
 from pbrs_farm.core.house import ItemKind
-from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of
-from pbrs_farm.export.form import Convention, ViewForm
+from pbrs_farm.export.chosen_view import ChosenView
+from pbrs_farm.export.content import Files, Line, each_view
+from pbrs_farm.export.form import PICTURES, Convention, ViewForm
 from pbrs_farm.export.nouns import counted, is_plural, listed, noun_of
-from pbrs_farm.export.sequences import pose_opencv
 from pbrs_farm.formats.output_folder import RoomOutline
 from pbrs_farm.home.room_use import RoomKind, named_kind
 
@@ -76,7 +75,7 @@ class _Seen:
 
 def _things(view: ChosenView) -> list[_Seen]:
     """The described objects, in descending order of pixels."""
-    camera_from_world = np.linalg.inv(pose_opencv(view))
+    camera_from_world = np.linalg.inv(view.pose)
     things = []
     for row in sorted(view.facts["instances"], key=lambda r: (-r["pixels"], r["id"])):
         share = row["visible_fraction"]
@@ -142,7 +141,7 @@ def _is_on(a: _Seen, b: _Seen) -> bool:
 
 def _relations(view: ChosenView, things: Sequence[_Seen]) -> list[dict[str, Any]]:
     """Relations of each pair of the largest objects, smaller first: "on top of" first, then by size."""
-    by_axes = intrinsics_of(view.facts).lens.depth_is_planar
+    by_axes = view.intrinsics.lens.depth_is_planar
     rows = []
     for larger, smaller in combinations(things[:_RELATED], 2):
         relation = _relation(smaller, larger, by_axes=by_axes)
@@ -154,27 +153,21 @@ def _relations(view: ChosenView, things: Sequence[_Seen]) -> list[dict[str, Any]
     return sorted(rows, key=lambda row: row["relation"] != "on top of")
 
 
-def write_captions(views: list[ChosenView], out: Path, _choice: Choice) -> None:
-    """Write captions.jsonl, a line a view, and images/<house>/<view>.png.
+def _files(view: ChosenView) -> Files:
+    """images/<house>/<view>.png, and a line of captions.jsonl.
 
     A line has file_name, text, objects (id, noun, box2d, the largest first) and relations (subject,
     relation, object by id, among the largest six). An object is listed if LEAST_VISIBLE of it is
     visible on LEAST_FRACTION of the picture; walls, floors and ceilings are not listed. Nouns are
     NYU40's, or the names of the user's classes. Views without a picture are left out.
     """
-    lines = []
-    for view in views:
-        if view.picture is None:
-            continue
-        name = f"images/{view.house.id}/{view.id}.png"
-        (out / name).parent.mkdir(parents=True, exist_ok=True)
-        (out / name).write_bytes(view.data(view.picture))
-        lines.append(json.dumps({"file_name": name, **caption(view)}, ensure_ascii=False))
-    (out / "captions.jsonl").write_text("".join(f"{line}\n" for line in lines), "utf-8")
+    name = f"images/{view.house.id}/{view.id}.png"
+    row = json.dumps({"file_name": name, **caption(view)}, ensure_ascii=False)
+    return {name: view.shown, "captions.jsonl": Line(row)}
 
 
 def caption(view: ChosenView) -> dict[str, Any]:
-    """text, objects and relations of a view, as write_captions says.
+    """text, objects and relations of a view, as _files says.
 
     Depends on the labels alone, so the same view gives the same words. Objects carry box2d as view.json
     has it; relations name them by id.
@@ -242,10 +235,9 @@ def _seen_points(view: ChosenView) -> F64:
     y, x = (g.ravel() for g in np.mgrid[: depth.shape[0] : step, : depth.shape[1] : step])
     z = depth[y, x] / 1000
     y, x, z = y[z > 0], x[z > 0], z[z > 0]
-    rays = intrinsics_of(view.facts).directions(np.stack([x + 0.5, y + 0.5], axis=1))
-    before = np.maximum(z - _BEFORE_M / np.maximum(np.linalg.norm(rays, axis=1), 1), 0)
-    pose = pose_opencv(view)
-    return np.asarray((rays * before[:, None]) @ pose[:3, :3].T + pose[:3, 3])
+    pixels = np.stack([x + 0.5, y + 0.5], axis=1)
+    slant = np.linalg.norm(view.intrinsics.directions(pixels), axis=1)
+    return view.in_world(pixels, np.maximum(z - _BEFORE_M / np.maximum(slant, 1), 0))
 
 
 def _relation_sentences(relations: Iterable[dict[str, Any]], titles: dict[int, str]) -> list[str]:
@@ -263,9 +255,10 @@ def _relation_sentences(relations: Iterable[dict[str, Any]], titles: dict[int, s
 
 FORM = ViewForm(
     "captions",
-    write_captions,
+    each_view(_files),
     "`captions.jsonl`, a line a view: `file_name` (`images/<house>/<view>.png`), `text` in plain"
     " English, `objects` (`id`, `noun`, `box2d`), `relations` (`subject`, `relation`, `object` by id)",
+    takes=replace(PICTURES, left_out=""),
     has_classes=True,
     convention=Convention(0.5, axes=""),
 )

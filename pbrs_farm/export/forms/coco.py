@@ -6,7 +6,9 @@ Effects: reads views, writes files.
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from dataclasses import replace
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -14,10 +16,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.classes import NYU40_COLOURS
-from pbrs_farm.export.chosen_view import Choice, ChosenView, camera_facts
-from pbrs_farm.export.form import Convention, ViewForm, views_with_picture
+from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.content import Content, Files, write_files
+from pbrs_farm.export.form import PICTURES, Convention, ViewForm
 from pbrs_farm.export.masks import compressed_runs
-from pbrs_farm.images import png_from_array
 
 
 def write_coco(views: list[ChosenView], out: Path, choice: Choice) -> None:
@@ -27,24 +29,43 @@ def write_coco(views: list[ChosenView], out: Path, choice: Choice) -> None:
     lengths (as pycocotools reads them), iscrowd 0. Additional fields: house, view, K, lens and
     depth (where no pin-hole), world_from_camera_opencv, instance_id, visible_fraction, truncated.
     """
-    views_with_picture(views)
-    images: list[dict[str, Any]] = []
-    annotations: list[dict[str, Any]] = []
-    for number, view in enumerate(views, start=1):
-        images.append(_image(view, number, out))
-        for annotation in annotations_of(view):
-            annotations.append({"id": len(annotations) + 1, "image_id": number, **annotation})
+    categories = categories_of(choice)
     document: dict[str, Any] = {
         "info": {"description": "pbrs_farm", "version": "1.0"},
         "licenses": _licences(views),
-        "categories": categories_of(choice),
-        "images": images,
-        "annotations": annotations,
+        "categories": categories,
+        "images": [_image(view, number) for number, view in enumerate(views, start=1)],
+        "annotations": numbered_annotations(views),
     }
-    (out / "annotations.json").write_text(
-        json.dumps(document, separators=(",", ":")) + "\n", "utf-8"
-    )
-    _write_panoptic(views, images, document["categories"], out)
+    # Furniture and other items are COCO "things"; walls, floors, doors and other structure are
+    # "stuff".
+    panoptic = {
+        "images": document["images"],
+        "annotations": [_panoptic_row(view, number) for number, view in enumerate(views, start=1)],
+        "categories": [
+            c
+            | {
+                "isthing": int(c["supercategory"] == "object"),
+                "color": NYU40_COLOURS[1 + (c["id"] - 1) % 40].tolist(),
+            }
+            for c in categories
+        ],
+    }
+    documents = {"annotations.json": document, "panoptic.json": panoptic}
+    texts = {name: compact_json(table) for name, table in documents.items()}
+    write_files(out, chain([texts], map(_files, views)))
+
+
+def compact_json(document: Any) -> str:
+    """A large document on one line."""
+    return json.dumps(document, separators=(",", ":")) + "\n"
+
+
+def _files(view: ChosenView) -> Files:
+    """The picture of the best available mode, and the panoptic one."""
+    name = f"{view.house.id}/{view.id}.png"
+    files: dict[str, Content] = {f"panoptic/{name}": _segment_ids(view)}
+    return files if view.picture is None else files | {f"images/{name}": view.shown}
 
 
 def categories_of(choice: Choice) -> list[dict[str, Any]]:
@@ -60,22 +81,25 @@ def _licences(views: list[ChosenView]) -> list[dict[str, Any]]:
     return [{"id": i, "name": line, "url": ""} for i, line in enumerate(lines, start=1)]
 
 
-def _image(view: ChosenView, number: int, out: Path) -> dict[str, Any]:
+def _image(view: ChosenView, number: int) -> dict[str, Any]:
+    camera = ("K", "lens", "depth", "world_from_camera_opencv")  # lens and depth unless a pin-hole
     image = {
         "id": number,
         "width": view.facts["width_px"],
         "height": view.facts["height_px"],
         "house": view.house.id,
         "view": view.id,
-        **camera_facts(view.facts),
+        **{name: view.facts[name] for name in camera if name in view.facts},
     }
-    # Copy the picture of the best available mode.
     if view.picture is not None:
-        name = f"images/{view.house.id}/{view.id}.png"
-        (out / name).parent.mkdir(parents=True, exist_ok=True)
-        (out / name).write_bytes(view.data(view.picture))
-        image["file_name"] = name
+        image["file_name"] = f"images/{view.house.id}/{view.id}.png"
     return image
+
+
+def numbered_annotations(views: Iterable[ChosenView]) -> list[dict[str, Any]]:
+    """The annotations of images 1, 2, ..., numbered from 1."""
+    rows = ((k, row) for k, view in enumerate(views, start=1) for row in annotations_of(view))
+    return [{"id": n, "image_id": k, **row} for n, (k, row) in enumerate(rows, start=1)]
 
 
 def annotations_of(view: ChosenView) -> Iterator[dict[str, Any]]:
@@ -84,10 +108,9 @@ def annotations_of(view: ChosenView) -> Iterator[dict[str, Any]]:
     for row in view.facts["instances"]:
         if not view.class_of(row):
             continue  # no category
-        x0, y0, x1, y1 = row["box2d"]
         yield {
             "category_id": view.class_of(row),
-            "bbox": [x0, y0, x1 - x0, y1 - y0],  # left, top, width, height
+            "bbox": _bbox(row),
             "area": row["pixels"],
             "iscrowd": 0,
             "segmentation": compressed_runs(instance == row["id"]),
@@ -99,53 +122,37 @@ def annotations_of(view: ChosenView) -> Iterator[dict[str, Any]]:
         }
 
 
-def _write_panoptic(
-    views: list[ChosenView],
-    images: list[dict[str, Any]],
-    categories: list[dict[str, Any]],
-    out: Path,
-) -> None:
-    """panoptic.json and panoptic/<house>/<view>.png.
+def _panoptic_row(view: ChosenView, number: int) -> dict[str, Any]:
+    """The segments of panoptic/<house>/<view>.png.
 
-    images, categories: those of the instances, view by view. A segment is an instance with a class,
-    its id the instance's, in a pixel R + 256 G + 65536 B; pixels without a class are 0.
+    A segment is an instance with a class, its id the instance's, in a pixel R + 256 G + 65536 B; pixels without a
+    class are 0.
     """
-    annotations = []
-    for view, image in zip(views, images, strict=True):
-        name = f"{view.house.id}/{view.id}.png"
-        rows = [row for row in view.facts["instances"] if view.class_of(row)]
-        file = out / "panoptic" / name
-        file.parent.mkdir(parents=True, exist_ok=True)
-        file.write_bytes(png_from_array(_segment_ids(view.array("instance"), rows)))
-        segments = [_segment(row, view.class_of(row)) for row in rows]
-        annotations.append({"image_id": image["id"], "file_name": name, "segments_info": segments})
-    # Furniture and other items are COCO "things"; walls, floors, doors and other structure are
-    # "stuff".
-    document = {
-        "images": images,
-        "annotations": annotations,
-        "categories": [
-            c
-            | {
-                "isthing": int(c["supercategory"] == "object"),
-                "color": NYU40_COLOURS[1 + (c["id"] - 1) % 40].tolist(),
-            }
-            for c in categories
-        ],
-    }
-    (out / "panoptic.json").write_text(json.dumps(document, separators=(",", ":")) + "\n", "utf-8")
+    segments = [
+        {
+            "id": row["id"],
+            "category_id": view.class_of(row),
+            "area": row["pixels"],
+            "bbox": _bbox(row),
+            "iscrowd": 0,
+        }
+        for row in view.facts["instances"]
+        if view.class_of(row)
+    ]
+    name = f"{view.house.id}/{view.id}.png"
+    return {"image_id": number, "file_name": name, "segments_info": segments}
 
 
-def _segment(row: dict[str, Any], category: int) -> dict[str, Any]:
+def _bbox(row: dict[str, Any]) -> list[int]:
+    """Left, top, width, height."""
     x0, y0, x1, y1 = row["box2d"]
-    box = [x0, y0, x1 - x0, y1 - y0]
-    fields = {"category_id": category, "area": row["pixels"], "bbox": box, "iscrowd": 0}
-    return {"id": row["id"], **fields}
+    return [x0, y0, x1 - x0, y1 - y0]
 
 
-def _segment_ids(instance: NDArray[Any], rows: list[dict[str, Any]]) -> NDArray[np.uint8]:
-    is_row = np.isin(instance, [row["id"] for row in rows])
-    ids = np.where(is_row, instance, 0).astype(np.uint32)
+def _segment_ids(view: ChosenView) -> NDArray[np.uint8]:
+    instance = view.array("instance")
+    classed = [row["id"] for row in view.facts["instances"] if view.class_of(row)]
+    ids = np.where(np.isin(instance, classed), instance, 0).astype(np.uint32)
     return np.stack([ids & 255, ids >> 8 & 255, ids >> 16 & 255], axis=-1).astype(np.uint8)
 
 
@@ -154,6 +161,11 @@ FORM = ViewForm(
     write_coco,
     "`annotations.json` (NYU40 categories, compressed run lengths), `images/<house>/<view>.png`;"
     " panoptic: `panoptic.json`, `panoptic/<house>/<view>.png` (id = R + 256 G + 65536 B)",
+    takes=replace(
+        PICTURES,
+        of=lambda views: views if any(v.picture is not None for v in views) else [],
+        left_out="",
+    ),
     has_classes=True,
     convention=Convention(0.5, axes="OpenCV's"),
 )

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from pathlib import Path
 from typing import Final
 
@@ -11,9 +10,10 @@ from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of, require_lens
+from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.content import numbers, write_files
 from pbrs_farm.export.form import Convention, ViewForm
-from pbrs_farm.export.sequences import pose_opencv, required_picture
+from pbrs_farm.export.sequences import by_house
 
 _STEP_PX: Final = 16  # spacing of the pixels of a view with points
 _NO_POINT: Final = ("0.5 0.5 -1",)  # points of a view without a surface: a pixel without a point
@@ -26,38 +26,34 @@ def write_colmap(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     surfaces behind every 16th pixel, with its colour and that pixel as their track. Views of a rig have
     rigs.txt and frames.txt beside them, as COLMAP 3.12 and later read them.
     """
-    for house in dict.fromkeys(view.house.id for view in views):
-        shots = [view for view in views if view.house.id == house]
-        (out / house / "images").mkdir(parents=True)
-        (out / house / "sparse/0").mkdir(parents=True)
+    for house, shots in by_house(views).items():
         cameras: dict[tuple[str, str], int] = {}
-        images: list[str] = []
-        points: list[str] = []
+        lists: dict[str, list[str]] = {"images": [], "points3D": []}
         sensors: list[int] = []
         for number, view in enumerate(shots, start=1):
-            picture = required_picture(view, "colmap")
-            (out / house / "images" / f"{view.id}.png").write_bytes(view.data(picture))
             # Each camera of a rig is a sensor, even if two are alike.
             key = view.shot.eye, colmap_camera_line(view)
             camera = cameras.setdefault(key, len(cameras) + 1)
             sensors.append(camera)
-            pixels, lines = _points_of(view, picture)
+            pixels, lines = _points_of(view)
             # A line of its pose and one of its points. COLMAP allows an empty one, but readers of gsplat
             # and pycolmap take it for the end of the file.
-            first = len(points) + 1
-            observations = [f"{x:g} {y:g} {n}" for n, (x, y) in enumerate(pixels, start=first)]
-            line = " ".join(observations or _NO_POINT)
-            images.append(f"{number} {_pose_words(view)} {camera} {view.id}.png\n{line}\n")
-            points += [f"{line} 0 {number} {k}" for k, line in enumerate(lines)]
-        _write_lines(
-            out / house / "sparse/0/cameras.txt", (f"{n} {c}\n" for (_eye, c), n in cameras.items())
-        )
-        _write_lines(out / house / "sparse/0/images.txt", images)
-        numbered = (f"{n} {point}\n" for n, point in enumerate(points, start=1))
-        _write_lines(out / house / "sparse/0/points3D.txt", numbered)
+            first = len(lists["points3D"]) + 1
+            tracked = [f"{x:g} {y:g} {n}" for n, (x, y) in enumerate(pixels, start=first)]
+            track = " ".join(tracked or _NO_POINT)
+            lists["images"].append(
+                f"{number} {_pose_words(view)} {camera} {view.id}.png\n{track}\n"
+            )
+            lists["points3D"] += [
+                f"{n} {line} 0 {number} {k}\n"
+                for k, (n, line) in enumerate(enumerate(lines, first))
+            ]
+        lists["cameras"] = [f"{n} {line}\n" for (_eye, line), n in cameras.items()]
         if any("rig" in view.facts for view in shots):
-            for name, lines in zip(("rigs", "frames"), _rig_lines(shots, sensors), strict=True):
-                _write_lines(out / house / f"sparse/0/{name}.txt", lines)
+            lists["rigs"], lists["frames"] = _rig_lines(shots, sensors)
+        texts = {f"sparse/0/{name}.txt": "".join(lines) for name, lines in lists.items()}
+        pictures = ({f"images/{view.id}.png": view.shown} for view in shots)
+        write_files(out / house, pictures, texts)
 
 
 def _rig_lines(views: list[ChosenView], sensors: list[int]) -> tuple[list[str], list[str]]:
@@ -88,13 +84,8 @@ def _rig_from_camera(view: ChosenView) -> F64:
     return np.eye(4) if rig is None else np.array(rig["rig_from_camera_opencv"], np.float64)
 
 
-def _write_lines(file: Path, lines: Iterable[str]) -> None:
-    file.write_text("".join(lines), "utf-8")
-
-
 def colmap_camera_line(view: ChosenView) -> str:
-    require_lens(view, "colmap", *FORM.lenses)
-    i = intrinsics_of(view.facts)
+    i = view.intrinsics
     # FULL_OPENCV has OpenCV's first eight numbers.
     bent = i.lens.coefficients
     if i.lens.bends_lines:
@@ -103,23 +94,22 @@ def colmap_camera_line(view: ChosenView) -> str:
             raise BadInput("--to colmap", view.id, text, hint="another --to")
         bent = (*bent[:8], *([0.0] * (8 - len(bent))))
     model = {8: "FULL_OPENCV", 4: "OPENCV_FISHEYE"}.get(len(bent), "PINHOLE")
-    numbers = (i.fx, i.fy, i.cx, i.cy, *bent)
-    return f"{model} {i.width_px} {i.height_px} " + " ".join(f"{v:.9g}" for v in numbers)
+    return f"{model} {i.width_px} {i.height_px} {numbers((i.fx, i.fy, i.cx, i.cy, *bent))}"
 
 
 def _pose_words(view: ChosenView) -> str:
     """`qw qx qy qz tx ty tz`, camera from world."""
-    return _motion_words(np.asarray(np.linalg.inv(pose_opencv(view))))
+    return _motion_words(np.asarray(np.linalg.inv(view.pose)))
 
 
 def _motion_words(motion: F64) -> str:
     x, y, z, w = Rotation.from_matrix(motion[:3, :3]).as_quat(canonical=True)
-    return " ".join(f"{v:.9g}" for v in (w, x, y, z, *motion[:3, 3]))
+    return numbers((w, x, y, z, *motion[:3, 3]))
 
 
-def _points_of(view: ChosenView, picture: str) -> tuple[list[list[float]], list[str]]:
+def _points_of(view: ChosenView) -> tuple[list[list[float]], list[str]]:
     """The pixels (x, y) of a grid over the view, and the line `x y z r g b` of each."""
-    depth, rgb = view.array("depth"), view.array(picture)
+    depth, rgb = view.array("depth"), view.colours
     height, width = depth.shape
     grid = np.mgrid[_STEP_PX // 2 : height : _STEP_PX, _STEP_PX // 2 : width : _STEP_PX]
     rows, columns = (g.ravel() for g in grid)
@@ -127,9 +117,7 @@ def _points_of(view: ChosenView, picture: str) -> tuple[list[list[float]], list[
     rows, columns, z = rows[z > 0], columns[z > 0], z[z > 0]
     # From pixel centres through the lens into the world.
     pixels = np.stack([columns + 0.5, rows + 0.5], axis=1)
-    local = intrinsics_of(view.facts).directions(pixels) * z[:, None]
-    pose = pose_opencv(view)
-    world = local @ pose[:3, :3].T + pose[:3, 3]
+    world = view.in_world(pixels, z)
     colours = rgb[rows, columns]
     rows_of_pixels: list[list[float]] = pixels.tolist()
     return rows_of_pixels, [

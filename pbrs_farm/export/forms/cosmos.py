@@ -16,11 +16,11 @@ from typing import Any, Final
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.errors import BadInput
-from pbrs_farm.export.chosen_view import Choice, ChosenView, depth_metres, require_lens
-from pbrs_farm.export.form import REMARKS, Convention, ViewForm, name_left_out, write_file
+from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.content import Content, Files, Line, write_files
+from pbrs_farm.export.form import REMARKS, Convention, ViewForm, frames_with
 from pbrs_farm.export.forms.captions import caption
-from pbrs_farm.export.sequences import films_of, pace_of, picture_of
+from pbrs_farm.export.sequences import films_of, pace_of
 from pbrs_farm.formats.film_mp4 import film
 
 _LEAST_FRAMES: Final = 61  # of a window; its loader drops shorter ones
@@ -38,33 +38,29 @@ def write_cosmos(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     same in all frames. remarks.txt names films that its loader drops. BadInput without a film, MachineFailed
     without PyAV.
     """
-    films, stills = films_of(views)
-    if not films:
-        hint = "pbrs-farm run HOME --cameras walk --frames 121"
-        raise BadInput("--to", "cosmos", "no view is a frame of a sequence", hint=hint)
-    lists: dict[str, list[str]] = {"depth": [], "seg": []}
     remarks: list[str] = []
-    for (house, eye), frames in films.items():
-        for view in frames:
-            require_lens(view, "cosmos", *FORM.lenses)
-        uuid = f"{house}_{eye}" if eye else house
-        pace = pace_of(frames)
-        pictures = (picture_of(view, "cosmos") for view in frames)
-        write_file(out / f"videos/{uuid}.mp4", film(pictures, pace))
-        write_file(out / f"depth/{uuid}.mp4", film(_depth_pictures(frames), pace))
-        write_file(out / f"seg/{uuid}.mp4", film(_instance_pictures(frames), pace))
-        row = _row(uuid, frames, float(pace))
-        for control, lines in lists.items():
-            path = {"control_type": control, "control_path": f"{control}/{uuid}.mp4"}
-            lines.append(json.dumps(row | path) + "\n")
-        if len(frames) < _LEAST_FRAMES or row["duration"] > _MOST_SECONDS:
-            remarks.append(f"{uuid}: {len(frames)} frames of {row['duration']:g} s\n")
-    for control, lines in lists.items():
-        (out / f"{control}.jsonl").write_text("".join(lines), "utf-8")
+    write_files(out, (_files(*place, frames, remarks) for place, frames in films_of(views).items()))
     if remarks:
         head = f"its loader drops films below {_LEAST_FRAMES} frames or over {_MOST_SECONDS:g} s:\n"
         (out / REMARKS).write_text(head + "".join(remarks), "utf-8")
-    name_left_out(out, stills, "is no frame of a sequence")
+
+
+def _files(house: str, eye: str, frames: list[ChosenView], remarks: list[str]) -> Files:
+    """The films of a walk, and its line in each list; adds a remark if the loader drops it."""
+    uuid = f"{house}_{eye}" if eye else house
+    pace = pace_of(frames)
+    row = _row(uuid, frames, float(pace))
+    if len(frames) < _LEAST_FRAMES or row["duration"] > _MOST_SECONDS:
+        remarks.append(f"{uuid}: {len(frames)} frames of {row['duration']:g} s\n")
+    controls = {"depth": _depth_pictures(frames), "seg": _instance_pictures(frames)}
+    files: dict[str, Content] = {
+        f"videos/{uuid}.mp4": film((view.colours for view in frames), pace)
+    }
+    for control, pictures in controls.items():
+        path = f"{control}/{uuid}.mp4"
+        line = row | {"control_type": control, "control_path": path}
+        files |= {path: film(pictures, pace), f"{control}.jsonl": Line(json.dumps(line))}
+    return files
 
 
 def _row(uuid: str, frames: list[ChosenView], pace: float) -> dict[str, Any]:
@@ -108,9 +104,9 @@ def _instance_pictures(frames: list[ChosenView]) -> Iterator[NDArray[np.uint8]]:
 
 def _depth_pictures(frames: list[ChosenView]) -> Iterator[NDArray[np.uint8]]:
     """Pictures (H, W, 3) of inverse depth, by the nearest depth of all frames."""
-    near = min(float(d[d > 0].min(initial=np.inf)) for d in map(depth_metres, frames))
+    near = min(float(d[d > 0].min(initial=np.inf)) for d in (v.depth_m for v in frames))
     for view in frames:
-        depth = depth_metres(view)
+        depth = view.depth_m
         share = np.divide(near, depth, out=np.zeros_like(depth), where=depth > 0)
         yield np.repeat(np.rint(share * 255).astype(np.uint8)[..., None], 3, axis=2)
 
@@ -119,6 +115,7 @@ FORM = ViewForm(
     "cosmos",
     write_cosmos,
     "Cosmos Transfer: `depth.jsonl`, `seg.jsonl` (films and captions), `videos`, `depth`, `seg` (extra `video`)",
+    takes=frames_with("--cameras walk --frames 121"),
     lenses=("pinhole",),
     is_of_frames=True,
     convention=Convention(None, axes="", depth="nearest depth over depth, 8 bit"),

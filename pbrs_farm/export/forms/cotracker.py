@@ -17,17 +17,11 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.options import option
 from pbrs_farm.core.record import Record
-from pbrs_farm.export.chosen_view import (
-    Choice,
-    ChosenView,
-    depth_metres,
-    intrinsics_of,
-    k_of_whole_centres,
-    require_lens,
-)
-from pbrs_farm.export.form import REMARKS, Convention, ViewForm, name_left_out, write_file
-from pbrs_farm.export.forms.tapvid import NO_FILM, film_tracks
-from pbrs_farm.export.sequences import films_of, picture_of, pose_opencv
+from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.content import Content, Files, write_files
+from pbrs_farm.export.form import REMARKS, Convention, ViewForm
+from pbrs_farm.export.forms.tapvid import FILMS, film_tracks
+from pbrs_farm.export.sequences import films_of
 from pbrs_farm.formats.hypersim import ray_lengths
 from pbrs_farm.images import png_from_array
 
@@ -55,49 +49,42 @@ def write_cotracker(views: list[ChosenView], out: Path, choice: Choice) -> None:
     the place of the nearest frame with it in front. remarks.txt names films below 24 frames. BadInput without a
     film, without tracks.npz, and above 999 frames.
     """
-    films, others = films_of(views)
-    others += [view for (_house, eye), frames in films.items() if eye for view in frames]
-    films = {(house, eye): frames for (house, eye), frames in films.items() if not eye}
-    if not films:
-        raise BadInput("--to", "cotracker", "no view is a frame of a sequence", hint=NO_FILM)
-    for (house, _eye), frames in films.items():
-        _write_film(out / house, house, frames, choice.of(CoTrackerOptions).reader)
+    films = films_of(views)
+    reader = choice.of(CoTrackerOptions).reader
+    write_files(out, (_files(house, f, reader) for (house, _eye), f in films.items()))
     short = [f"{h}: {len(f)}\n" for (h, _eye), f in films.items() if len(f) < _USUAL_FRAMES]
     if short:
         head = f"films with fewer than the {_USUAL_FRAMES} frames of CoTracker's samples:\n"
         (out / REMARKS).write_text(head + "".join(short), "utf-8")
-    name_left_out(out, others, "is not a film frame of the rig's first camera")
 
 
-def _write_film(folder: Path, house: str, frames: list[ChosenView], reader: str) -> None:
+def _files(house: str, frames: list[ChosenView], reader: str) -> Files:
     if len(frames) > _MOST_FRAMES:
         raise BadInput(house, "", f"has {len(frames)} frames, more than {_MOST_FRAMES}")
-    distances = [depth_metres(view) * ray_lengths(intrinsics_of(view.facts)) for view in frames]
+    distances = [view.depth_m * ray_lengths(view.intrinsics) for view in frames]
     hits = [array[array > 0] for array in distances if (array > 0).any()]
     near = min((float(array.min()) for array in hits), default=0.0)
     far = max(max((float(array.max()) for array in hits), default=1.0), near + 1e-3)
-    for number, (view, distance) in enumerate(zip(frames, distances, strict=True)):
-        require_lens(view, "cotracker", *FORM.lenses)
-        picture = png_from_array(picture_of(view, "cotracker"), attribution=view.house.attribution)
-        write_file(folder / f"frames/{number:03d}.png", picture)
-        beside = "frames" if reader == "tapip3d" else "depth"
-        share = np.where(distance > 0, (distance - near) / (far - near), 1)
-        png = png_from_array(np.rint(share * 65535).astype(np.uint16))
-        write_file(folder / f"{beside}/{number:03d}_depth.png", png)
     table = _table(frames, reader) | {"depth_range": np.array([near, far], np.float32)}
-    np.save(folder / f"{house}.npy", np.array(table, object), allow_pickle=True)
+    files: dict[str, Content] = {f"{house}/{house}.npy": np.array(table, object)}
+    beside = "frames" if reader == "tapip3d" else "depth"
+    for number, (view, distance) in enumerate(zip(frames, distances, strict=True)):
+        picture = png_from_array(view.colours, attribution=view.house.attribution)
+        files[f"{house}/frames/{number:03d}.png"] = picture
+        share = np.where(distance > 0, (distance - near) / (far - near), 1)
+        files[f"{house}/{beside}/{number:03d}_depth.png"] = np.rint(share * 65535).astype(np.uint16)
+    return files
 
 
 def _table(frames: list[ChosenView], reader: str) -> dict[str, NDArray[Any]]:
-    tracks, facts = film_tracks(frames), frames[0].facts
-    size = np.array([facts["width_px"], facts["height_px"]], np.float64)
+    tracks = film_tracks(frames)
+    size = np.array(frames[0].size, np.float64)
     coords, occluded = tracks["points"] * size, tracks["occluded"]
     over_size = np.array([[1 / size[0]], [1 / size[1]], [1.0]])
-    ks = [view.facts["K"] for view in frames]
-    if reader == "tapip3d":
-        ks = [k_of_whole_centres(k) for k in ks]
+    is_whole = reader == "tapip3d"
+    ks = [view.k_of_whole_centres if is_whole else view.facts["K"] for view in frames]
     intrinsics = [np.array(k, np.float64) * over_size for k in ks]
-    poses = [np.array(view.facts["world_from_camera_opengl"], np.float64) for view in frames]
+    poses = [view.opengl_pose for view in frames]
     return {
         "coords": coords.astype(np.float32),
         "visibility": occluded,
@@ -112,9 +99,7 @@ def places_of_tracks(coords: F64, depth_m: NDArray[np.float32], frames: list[Cho
     """(N, T, 3) world, metres; of points behind the camera those of the nearest frame with them in front."""
     places = np.empty((*depth_m.shape, 3))
     for k, view in enumerate(frames):
-        pose = pose_opencv(view)
-        rays = intrinsics_of(view.facts).directions(coords[:, k])
-        places[:, k] = (rays * depth_m[:, k, None]) @ pose[:3, :3].T + pose[:3, 3]
+        places[:, k] = view.in_world(coords[:, k], depth_m[:, k])
     number = np.arange(len(frames))
     gap = np.abs(number[:, None] - number) + np.where(depth_m > 0, 0, len(frames))[:, None, :]
     return np.asarray(places[np.arange(len(places))[:, None], gap.argmin(-1)])
@@ -126,6 +111,7 @@ FORM = ViewForm(
     "CoTracker3's Kubric folders: `<house>/<house>.npy`, `frames`, `depth`; of films with `--tracks`;"
     " `--reader tapip3d` puts depth beside the frames",
     options=CoTrackerOptions,
+    takes=FILMS,
     lenses=("pinhole",),
     is_of_frames=True,
     convention=Convention(

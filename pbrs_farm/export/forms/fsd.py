@@ -9,6 +9,8 @@ Effects: reads views, writes files.
 
 from __future__ import annotations
 
+from collections.abc import Iterator
+from itertools import count, starmap
 from pathlib import Path
 from typing import Final
 
@@ -17,18 +19,11 @@ from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.export.chosen_view import (
-    Choice,
-    ChosenView,
-    depth_metres,
-    k_of_whole_centres,
-    require_lens,
-)
-from pbrs_farm.export.form import REMARKS, Convention, ViewForm, name_left_out, write_file
-from pbrs_farm.export.sequences import frames_by_house, picture_of, pose_opencv
-from pbrs_farm.images import jpeg_from_array, png_from_array
+from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.content import Files, Line, numbers, write_files
+from pbrs_farm.export.form import REMARKS, Convention, Takes, ViewForm
+from pbrs_farm.export.sequences import frames_by_house
 
-_QUALITY: Final = 95  # of JPEG
 _BASE: Final = 255  # of the three digits of a disparity, the red one first
 _STEPS_PER_PX: Final = 1000
 _KITTI_STEPS: Final = 256  # a px in the layer `disparity`
@@ -42,40 +37,44 @@ def write_fsd(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     or the layer `disparity`, whose steps of 1/256 px remarks.txt mentions. intrinsics: nine numbers of K, then the
     baseline in metres. index.txt: folder, number, house and view of each pair. BadInput without a pair.
     """
-    rows: list[str] = []
-    written: set[tuple[str, str]] = set()
-    is_coarse = False
-    for house, frames in frames_by_house(views).items():
-        folder = out / house / "dataset/data"
-        pairs = [(frame.first, frame.right) for frame in frames if frame.right is not None]
-        for number, (left, right) in enumerate(pairs):
-            require_lens(left, "fsd", *FORM.lenses)
-            name = f"{number:04d}"
-            for side, view in (("left", left), ("right", right)):
-                picture = picture_of(view, "fsd")
-                write_file(folder / side / f"rgb/{name}.jpg", jpeg_from_array(picture, _QUALITY))
-                written.add((house, view.id))
-            baseline_m = float(np.linalg.norm((pose_opencv(right) - pose_opencv(left))[:3, 3]))
-            is_coarse |= not left.has("depth_z")
-            png = png_from_array(digits_of_disparity(_disparity(left, baseline_m)))
-            write_file(folder / f"left/disparity/{name}.png", png)
-            k = " ".join(f"{v:.9g}" for row in k_of_whole_centres(left.facts["K"]) for v in row)
-            write_file(folder / f"left/intrinsics/{name}.txt", f"{k}\n{baseline_m:.9g}\n".encode())
-            rows.append(f"{house}/dataset/data {name} {house} {left.id}\n")
-    if not rows:
-        raise BadInput("--to", "fsd", "no view has a right one", hint=_HINT)
-    (out / "index.txt").write_text("".join(rows), "utf-8")
-    if is_coarse:
+    write_files(out, starmap(_files, _pairs(views)))
+    if any(not left.has("depth_z") for left, _right, _number in _pairs(views)):
         text = f"disparity: steps of 1/{_KITTI_STEPS} px; for 1/{_STEPS_PER_PX} {_HINT}\n"
         (out / REMARKS).write_text(text, "utf-8")
-    single = [view for view in views if (view.house.id, view.id) not in written]
-    name_left_out(out, single, "has no right view")
+
+
+def _pairs(views: list[ChosenView]) -> Iterator[tuple[ChosenView, ChosenView, int]]:
+    """The left and the right view of each pair, and its number in its house."""
+    for frames in frames_by_house(views).values():
+        pairs = ((f.first, f.right) for f in frames)
+        numbers = count()
+        yield from ((left, right, next(numbers)) for left, right in pairs if right is not None)
+
+
+def _paired(views: list[ChosenView]) -> list[ChosenView]:
+    paired = {id(view) for left, right, _number in _pairs(views) for view in (left, right)}
+    return [view for view in views if id(view) in paired]
+
+
+def _files(left: ChosenView, right: ChosenView, number: int) -> Files:
+    house, name = left.house.id, f"{number:04d}"
+    folder = f"{house}/dataset/data"
+    baseline_m = float(np.linalg.norm((right.pose - left.pose)[:3, 3]))
+    return {
+        f"{folder}/left/rgb/{name}.jpg": left.colours,
+        f"{folder}/right/rgb/{name}.jpg": right.colours,
+        f"{folder}/left/disparity/{name}.png": digits_of_disparity(_disparity(left, baseline_m)),
+        f"{folder}/left/intrinsics/{name}.txt": (
+            f"{numbers(np.ravel(left.k_of_whole_centres))}\n{baseline_m:.9g}\n"
+        ),
+        "index.txt": Line(f"{folder} {name} {house} {left.id}"),
+    }
 
 
 def _disparity(view: ChosenView, baseline_m: float) -> F64:
     """(H, W) px from the left picture to the right one, 0 for nothing."""
     if view.has("depth_z"):
-        depth = depth_metres(view)
+        depth = view.depth_m
         reach = float(view.facts["K"][0][0]) * baseline_m
         return np.divide(reach, depth, out=np.zeros_like(depth), where=depth > 0)
     if not view.has("disparity"):
@@ -101,6 +100,7 @@ FORM = ViewForm(
     "fsd",
     write_fsd,
     "FoundationStereo's pairs: `<house>/dataset/data/left/rgb`, `right/rgb`, `left/disparity`, `left/intrinsics`, `index.txt`",
+    takes=Takes(_paired, "has no right view", "no view has a right one", _HINT),
     lenses=("pinhole",),
     layers=("depth_z", "disparity"),
     convention=Convention(0, axes="", depth="1000 steps a px of disparity"),

@@ -17,8 +17,9 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.export.content import write_files
 from pbrs_farm.export.form import HomeForm
-from pbrs_farm.export.home_files import digest_name, write_files, xml_bytes
+from pbrs_farm.export.home_files import digest_name, xml_bytes
 from pbrs_farm.export.home_glb import glb_of_pieces
 from pbrs_farm.export.home_pieces import COLLIDES, COLLISION, ExportedHome, Piece
 from pbrs_farm.export.urdf_links import add_inertial, add_mesh, add_moving_joint
@@ -88,7 +89,7 @@ def write_habitat(home: ExportedHome, folder: Path) -> None:
             "semantic_scene_descriptor_instances": {"paths": {".json": ["semantics"]}},
         }
     )
-    write_files(folder, files)
+    write_files(folder, [files])
 
 
 def _json(value: Any) -> bytes:

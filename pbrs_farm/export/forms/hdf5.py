@@ -9,10 +9,10 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.errors import MachineFailed
-from pbrs_farm.export.chosen_view import PICTURES, Choice, ChosenView, k_of_whole_centres
+from pbrs_farm.export.chosen_view import PICTURES, Choice, ChosenView
+from pbrs_farm.export.content import Line, write_files
 from pbrs_farm.export.form import Convention, ViewForm
-from pbrs_farm.installation import install_command
+from pbrs_farm.installation import need
 
 
 def write_hdf5(views: list[ChosenView], out: Path, _choice: Choice) -> None:
@@ -25,8 +25,9 @@ def write_hdf5(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     of the first pixel is (0, 0), so that cx is (W - 1) / 2; where no pin-hole, also lens and depth as
     view.json has them). Raises MachineFailed without h5py.
     """
-    h5py = _h5py()
-    index = []
+    need("h5py")
+    import h5py
+
     for number, view in enumerate(views):
         with h5py.File(out / f"{number}.hdf5", "w") as file:
             for name, value in _datasets(view).items():
@@ -34,19 +35,11 @@ def write_hdf5(views: list[ChosenView], out: Path, _choice: Choice) -> None:
                     file.create_dataset(name, data=np.bytes_(value.encode()))
                 else:
                     file.create_dataset(name, data=value, compression="gzip")
-        row = {"file": f"{number}.hdf5", "house": view.house.id, "view": view.id}
-        index.append(json.dumps(row))
-    # The index names the view of each file.
-    (out / "index.jsonl").write_text("\n".join(index) + "\n", "utf-8")
-
-
-def _h5py() -> Any:
-    try:
-        import h5py
-    except ImportError:
-        hint = install_command("selection")
-        raise MachineFailed("writing HDF5 needs h5py", hint=hint) from None
-    return h5py
+    rows = (
+        {"file": f"{number}.hdf5", "house": view.house.id, "view": view.id}
+        for number, view in enumerate(views)
+    )
+    write_files(out, ({"index.jsonl": Line(json.dumps(row))} for row in rows))
 
 
 def _datasets(view: ChosenView) -> dict[str, NDArray[Any] | str]:
@@ -69,7 +62,7 @@ def _datasets(view: ChosenView) -> dict[str, NDArray[Any] | str]:
     pose = view.facts["world_from_camera_opengl"]
     lens = {name: view.facts[name] for name in ("lens", "depth") if name in view.facts}
     data["campose"] = json.dumps(
-        {"cam_K": k_of_whole_centres(view.facts["K"]), "cam2world_matrix": pose} | lens
+        {"cam_K": view.k_of_whole_centres, "cam2world_matrix": pose} | lens
     )
     return data
 

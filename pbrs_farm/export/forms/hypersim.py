@@ -20,32 +20,16 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F32, F64
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.frames import linear_from_srgb
-from pbrs_farm.export.chosen_view import (
-    Choice,
-    ChosenView,
-    depth_metres,
-    intrinsics_of,
-    opengl_normals,
-    require_lens,
-)
-from pbrs_farm.export.form import Convention, ViewForm, write_file
+from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.content import write_files
+from pbrs_farm.export.form import Convention, ViewForm
 from pbrs_farm.export.intrinsic_parts import parts_without_negatives, picture_radiance
-from pbrs_farm.export.sequences import pose_opencv
 from pbrs_farm.formats import hypersim
-from pbrs_farm.images import jpeg_from_array
 
 _MOST_SCENES: Final = 999  # scenes of a volume
 _MOST_LIGHT: Final = 65504.0  # maximum of a half float
 _INDEX: Final = "index.csv"  # not in Hypersim: the view of each frame
 _CREDITS: Final = "ATTRIBUTION.txt"
-_SPLIT_FIELDS: Final = (
-    "scene_name",
-    "camera_name",
-    "frame_id",
-    "included_in_public_release",
-    "exclude_reason",
-    "split_partition_name",
-)
 
 
 def write_hypersim(views: list[ChosenView], out: Path, choice: Choice) -> None:
@@ -84,8 +68,7 @@ def _scenes(views: Iterable[ChosenView]) -> list[list[ChosenView]]:
     """The views by home and pin-hole: a scene has one projection."""
     scenes: dict[tuple[Any, ...], list[ChosenView]] = {}
     for view in views:
-        require_lens(view, "hypersim", *FORM.lenses)
-        i = intrinsics_of(view.facts)
+        i = view.intrinsics
         key = (view.house.id, i.width_px, i.height_px, i.fx, i.fy, i.cx, i.cy)
         scenes.setdefault(key, []).append(view)
     return list(scenes.values())
@@ -106,25 +89,21 @@ def _trajectories(views: Iterable[ChosenView]) -> list[list[ChosenView]]:
 def _write_scene(
     folder: Path, views: list[ChosenView], tables: Mapping[str, list[dict[str, Any]]], scene: str
 ) -> None:
-    detail = folder / "_detail"
+    detail, parts = folder / "_detail", dict[str, dict[str, NDArray[Any]]]()
     cameras = {f"cam_{k:02d}": camera_views for k, camera_views in enumerate(_trajectories(views))}
     for camera, camera_views in cameras.items():
         for frame, view in enumerate(camera_views):
-            files = _frame(view)
-            for (part, name), array in files.items():
-                file = folder / hypersim.frame_file(camera, frame, part, name)
-                if isinstance(array, bytes):
-                    write_file(file, array)
-                else:
-                    hypersim.write_dataset(file, array)
+            files = {hypersim.frame_file(camera, frame, *at): c for at, c in _frame(view).items()}
+            write_files(folder, [files])
             place: dict[str, Any] = {"scene_name": scene, "camera_name": camera, "frame_id": frame}
             tables[_INDEX].append(place | {"house": view.house.id, "view": view.id})
             split = {"included_in_public_release": True, "exclude_reason": ""}
             tables[hypersim.SPLIT_CSV].append(place | split | {"split_partition_name": "train"})
-        for name, array in _trajectory(camera_views).items():
-            hypersim.write_dataset(detail / camera / f"{name}.hdf5", array)
-    for name, array in _boxes(views).items():
-        hypersim.write_dataset(detail / "mesh" / f"{name}.hdf5", array)
+        parts[camera] = _trajectory(camera_views)
+    parts["mesh"] = _boxes(views)
+    write_files(
+        detail, ({f"{part}/{n}.hdf5": a for n, a in of.items()} for part, of in parts.items())
+    )
     _write_table(detail / "metadata_cameras.csv", [{"camera_name": name} for name in cameras])
     row = {"parameter_name": "meters_per_asset_unit", "parameter_value": 1.0}
     _write_table(detail / "metadata_scene.csv", [row])
@@ -133,7 +112,7 @@ def _write_scene(
 
 def _trajectory(views: Sequence[ChosenView]) -> dict[str, NDArray[Any]]:
     poses = np.array([view.facts["world_from_camera_opengl"] for view in views], np.float64)
-    turn = hypersim.Z_UP_FROM_Y_UP
+    turn = hypersim.Z_UP
     return {
         "camera_keyframe_positions": poses[:, :3, 3] @ turn.T,
         "camera_keyframe_orientations": turn @ poses[:, :3, :3],
@@ -158,17 +137,17 @@ def _boxes(views: Iterable[ChosenView]) -> dict[str, NDArray[Any]]:
 
 def upright_box(box: Mapping[str, Any]) -> tuple[F64, F64, F64]:
     """Centre (3,), size (3,) and axes (3, 3; columns) of a box3d in the world with z up, z the most upright axis."""
-    axes = hypersim.Z_UP_FROM_Y_UP @ np.array(box["axes"], np.float64).T
+    axes = hypersim.Z_UP @ np.array(box["axes"], np.float64).T
     up = int(np.abs(axes[2]).argmax())
     order = [(up + 1) % 3, (up + 2) % 3, up]
     upright = axes[:, order] * np.where(axes[2, up] < 0, -1.0, 1.0)
     upright[:, 1] *= np.sign(np.linalg.det(upright)) or 1.0
-    centre = hypersim.Z_UP_FROM_Y_UP @ np.array(box["centre"], np.float64)
+    centre = hypersim.Z_UP @ np.array(box["centre"], np.float64)
     return centre, 2 * np.array(box["half"], np.float64)[order], upright
 
 
 def _parameters(scene: str, view: ChosenView) -> dict[str, Any]:
-    i = intrinsics_of(view.facts)
+    i = view.intrinsics
     row: dict[str, Any] = {
         "scene_name": scene,
         "settings_output_img_height": i.height_px,
@@ -194,22 +173,21 @@ def _frame(view: ChosenView) -> dict[tuple[str, str], NDArray[Any] | bytes]:
     for name, array in geometry.items():
         files["geometry_hdf5", f"{name}.hdf5"] = array
     if view.picture is not None:
-        files["final_preview", "tonemap.jpg"] = jpeg_from_array(view.array(view.picture), 95)
+        files["final_preview", "tonemap.jpg"] = view.colours
     if "color" in light:
-        shown = hypersim.preview(
-            light["color"].astype(np.float32), geometry["render_entity_id"] >= 0
-        )
-        files["final_preview", "color.jpg"] = jpeg_from_array(shown, 95)
+        colour = light["color"].astype(np.float32)
+        shown = hypersim.preview(colour, geometry["render_entity_id"] >= 0)
+        files["final_preview", "color.jpg"] = shown
     return files
 
 
 def _geometry(view: ChosenView) -> dict[str, NDArray[Any]]:
-    z, instance = depth_metres(view), view.array("instance")
-    i, is_visible = intrinsics_of(view.facts), z > 0
+    z, instance = view.depth_m, view.array("instance")
+    i, is_visible = view.intrinsics, z > 0
     along = np.where(is_visible, z * hypersim.ray_lengths(i), np.nan)
     semantic = view.array("semantic") if view.choice.classes is None else None
-    pose, turn = pose_opencv(view), hypersim.Z_UP_FROM_Y_UP
-    local = opengl_normals(view)
+    pose, turn = view.pose, hypersim.Z_UP
+    local = view.opengl_normals()
     arrays: dict[str, NDArray[Any]] = {
         "depth_meters": along.astype(np.float32),
         "position": _positions(z, i, pose, turn),
@@ -221,7 +199,7 @@ def _geometry(view: ChosenView) -> dict[str, NDArray[Any]]:
     if semantic is not None:
         arrays["semantic"] = np.where(semantic > 0, semantic.astype(np.int16), np.int16(-1))
     if view.has("normal_shading"):
-        bent = opengl_normals(view, "normal_shading")
+        bent = view.opengl_normals("normal_shading")
         arrays |= {"normal_bump_cam": bent, "normal_bump_world": _in_world(bent, pose, turn)}
     return arrays
 
@@ -268,11 +246,6 @@ def _write_table(file: Path, rows: Sequence[Mapping[str, Any]]) -> None:
         writer.writerows(rows)
 
 
-def _table(file: Path) -> list[dict[str, str]]:
-    with file.open(encoding="utf-8", newline="") as opened:
-        return list(csv.DictReader(opened))
-
-
 def join_splits(out: Path, splits: tuple[str, ...], _choice: Choice) -> None:
     """Join the splits to one root, as in Hypersim, and write the card."""
     names = (hypersim.SPLIT_CSV, hypersim.CAMERAS_CSV, _INDEX)
@@ -287,7 +260,7 @@ def join_splits(out: Path, splits: tuple[str, ...], _choice: Choice) -> None:
         }
         n_scenes += len(names_of)
         for name in names:
-            for row in _table(part / name):
+            for row in hypersim.table_rows(part / name):
                 row["scene_name"] = names_of[row["scene_name"]]
                 if "split_partition_name" in row:
                     row["split_partition_name"] = split
@@ -308,7 +281,10 @@ def join_splits(out: Path, splits: tuple[str, ...], _choice: Choice) -> None:
 
 
 def _card(out: Path) -> str:
-    rows, frames = _table(out / hypersim.CAMERAS_CSV), len(_table(out / _INDEX))
+    rows, frames = (
+        hypersim.table_rows(out / hypersim.CAMERAS_CSV),
+        len(hypersim.table_rows(out / _INDEX)),
+    )
     usual = hypersim.cam_from_uv(hypersim.usual_intrinsics(hypersim.WIDTH_PX, hypersim.HEIGHT_PX))
     unusual = [row["scene_name"] for row in rows if not _is_usual(row, usual)]
     camera = (

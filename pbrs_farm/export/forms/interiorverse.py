@@ -8,25 +8,18 @@ Effects: reads views, writes files.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from pbrs_farm.core.arrays import F32
-from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.frames import linear_from_srgb
-from pbrs_farm.export.chosen_view import (
-    Choice,
-    ChosenView,
-    depth_metres,
-    opengl_normals,
-    require_lens,
-)
-from pbrs_farm.export.form import Convention, ViewForm, name_left_out, write_file
+from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.content import Files, Line, rgb_planes, write_files
+from pbrs_farm.export.form import Convention, ViewForm, with_parts
 from pbrs_farm.export.intrinsic_parts import material_planes, opaque_pixels, picture_radiance
-from pbrs_farm.images import exr_from_layers
 
 _INDEX: Final = "index.csv"  # not in InteriorVerse: the view of each number
 _LAYERS: Final = ("albedo", "roughness", "metallic", "normal")
@@ -42,37 +35,25 @@ def write_interiorverse(views: list[ChosenView], out: Path, _choice: Choice) -> 
     surface. mask: 1 = a surface, but no glass or mirror if the views have these layers. A house's name
     has "-im" for "_im". left_out.txt names views without the layers; BadInput if none has them.
     """
-    chosen = [view for view in views if view.picture is not None and all(map(view.has, _LAYERS))]
-    if not chosen:
-        hint = f"run with --layers {' '.join(_LAYERS[:3])}"
-        raise BadInput("--to", "interiorverse", "no view has a picture and materials", hint=hint)
     numbers: dict[str, int] = {}
-    rows = ["scene,image,house,view\n"]
-    for view in chosen:
-        require_lens(view, "interiorverse", *FORM.lenses)
-        scene = view.house.id.replace(_WORD, "-im")
-        number = numbers[scene] = numbers.get(scene, -1) + 1
-        for name, planes in _images(view):
-            write_file(out / scene / f"{number:03d}_{name}.exr", exr_from_layers(planes))
-        rows.append(f"{scene},{number:03d},{view.house.id},{view.id}\n")
-    (out / _INDEX).write_text("".join(rows), "utf-8")
-    name_left_out(out, [v for v in views if v not in chosen], "has no picture or no materials")
+    tables = (_files(view, numbers) for view in views)
+    write_files(out, tables, {_INDEX: Line("scene,image,house,view")})
 
 
-def _images(view: ChosenView) -> Iterator[tuple[str, dict[str, F32]]]:
-    """The name and the channels of each file of a view."""
-    yield "im", _rgb(_exposed_light(view))
-    yield "albedo", _rgb(linear_from_srgb(view.array("albedo") / 255).astype(np.float32))
-    yield "material", material_planes(view)
-    yield "normal", _rgb(opengl_normals(view))
-    metres = depth_metres(view)
-    millimetres = np.where(metres > 0, metres * 1000, np.inf).astype(np.float32)
-    yield "depth", dict.fromkeys("RGB", millimetres)
-    yield "mask", {"Y": opaque_pixels(view).astype(np.float32)}
-
-
-def _rgb(image: F32) -> dict[str, F32]:
-    return dict(zip("RGB", np.moveaxis(image, -1, 0), strict=True))
+def _files(view: ChosenView, numbers: dict[str, int]) -> Files:
+    scene = view.house.id.replace(_WORD, "-im")
+    number = numbers[scene] = numbers.get(scene, -1) + 1
+    millimetres = np.where(view.depth_m > 0, view.depth_m * 1000, np.inf).astype(np.float32)
+    images: dict[str, Mapping[str, F32]] = {
+        "im": rgb_planes(_exposed_light(view)),
+        "albedo": rgb_planes(linear_from_srgb(view.array("albedo") / 255).astype(np.float32)),
+        "material": material_planes(view),
+        "normal": rgb_planes(view.opengl_normals()),
+        "depth": dict.fromkeys("RGB", millimetres),
+        "mask": {"Y": opaque_pixels(view).astype(np.float32)},
+    }
+    files = {f"{scene}/{number:03d}_{name}.exr": planes for name, planes in images.items()}
+    return {**files, _INDEX: Line(f"{scene},{number:03d},{view.house.id},{view.id}")}
 
 
 def _exposed_light(view: ChosenView) -> F32:
@@ -98,6 +79,7 @@ FORM = ViewForm(
     write_interiorverse,
     "InteriorVerse: `<house>/<3 digits>_im.exr`, `_albedo`, `_material`, `_normal`, `_depth`, `_mask`; `train.txt`, `index.csv`",
     finish=join_lists,
+    takes=with_parts("materials", *_LAYERS, hint=f"run with --layers {' '.join(_LAYERS[:3])}"),
     lenses=("pinhole",),
     layers=("roughness",),
     reads_radiance=True,

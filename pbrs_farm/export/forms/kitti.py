@@ -2,17 +2,17 @@
 
 from __future__ import annotations
 
+from itertools import count, zip_longest
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.errors import BadInput
-from pbrs_farm.export.chosen_view import Choice, ChosenView, k_of_whole_centres, require_lens
-from pbrs_farm.export.form import Convention, ViewForm, write_file
-from pbrs_farm.export.sequences import SequenceFrame, frames_by_house, required_picture
-from pbrs_farm.images import png_from_array
+from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.content import Content, Files, Line, write_files
+from pbrs_farm.export.form import Convention, Takes, ViewForm
+from pbrs_farm.export.sequences import SequenceFrame, frames_by_house
 
 _SEEN: Final = 0  # of the layers of occlusion
 
@@ -24,47 +24,49 @@ def write_kitti(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     `noc` only those visible in the other picture. index.txt: number, house, view. Files without data are
     omitted; BadInput if no view has flow or disparity.
     """
-    rows: list[str] = []
-    for house, frames in frames_by_house(views).items():
-        for k, frame in enumerate(frames):
-            files = _labels(frame.first)
-            if not files:
-                continue
-            number = f"{len(rows):06d}"
-            following = frames[k + 1] if k + 1 < len(frames) else None
-            files |= _pictures(frame, "10") | (_pictures(following, "11") if following else {})
-            files["calib/{}.txt"] = _calibration(frame).encode()
-            for name, data in files.items():
-                write_file(out / name.format(number), data)
-            rows.append(f"{number} {house} {frame.first.id}")
-    if not rows:
-        hint = "run with --stereo 0.065 --layers disparity occlusion_stereo flow_forward"
-        raise BadInput("--to", "kitti", "no view has flow or disparity", hint=hint)
-    (out / "index.txt").write_text("\n".join(rows) + "\n", "utf-8")
+    moments = [
+        moment
+        for frames in frames_by_house(views).values()
+        for moment in zip_longest(frames, frames[1:])
+        if _has_labels(moment[0].first)
+    ]
+    write_files(out, map(_files, count(), moments))
 
 
-def _pictures(frame: SequenceFrame, which: str) -> dict[str, bytes]:
-    files = {f"image_2/{{}}_{which}.png": frame.first.data(required_picture(frame.first, "kitti"))}
+def _has_labels(view: ChosenView) -> bool:
+    return view.has("disparity") or view.has("flow_forward")
+
+
+def _files(number: int, moment: tuple[SequenceFrame, SequenceFrame | None]) -> Files:
+    frame, following = moment
+    view, name = frame.first, f"{number:06d}"
+    files = _pictures(frame, f"{name}_10") | _labels(view, f"{name}_10.png")
+    if following is not None:
+        files |= _pictures(following, f"{name}_11")
+    row = Line(f"{name} {view.house.id} {view.id}")
+    return files | {f"calib/{name}.txt": _calibration(frame), "index.txt": row}
+
+
+def _pictures(frame: SequenceFrame, name: str) -> dict[str, Content]:
+    files: dict[str, Content] = {f"image_2/{name}.png": frame.first.shown}
     if frame.right is not None:
-        picture = required_picture(frame.right, "kitti")
-        files[f"image_3/{{}}_{which}.png"] = frame.right.data(picture)
+        files[f"image_3/{name}.png"] = frame.right.shown
     return files
 
 
-def _labels(view: ChosenView) -> dict[str, bytes]:
-    files = {}
+def _labels(view: ChosenView, name: str) -> dict[str, Content]:
+    files: dict[str, Content] = {}
     if view.has("disparity"):
-        disparity = view.array("disparity")
-        files["disp_occ_0/{}_10.png"] = png_from_array(disparity)
+        disparity = files[f"disp_occ_0/{name}"] = view.array("disparity")
         if view.has("occlusion_stereo"):
             shown = view.array("occlusion_stereo") == _SEEN
-            files["disp_noc_0/{}_10.png"] = png_from_array(np.where(shown, disparity, np.uint16(0)))
+            files[f"disp_noc_0/{name}"] = np.where(shown, disparity, np.uint16(0))
     if view.has("flow_forward"):
-        flow, has_depth = view.array("flow_forward"), view.array("depth") > 0
-        files["flow_occ/{}_10.png"] = png_from_array(kitti_flow(flow, has_depth))
+        flow = view.array("flow_forward")
+        files[f"flow_occ/{name}"] = kitti_flow(flow, view.array("depth") > 0)
         if view.has("occlusion_forward"):
             shown = view.array("occlusion_forward") == _SEEN
-            files["flow_noc/{}_10.png"] = png_from_array(kitti_flow(flow, shown))
+            files[f"flow_noc/{name}"] = kitti_flow(flow, shown)
     return files
 
 
@@ -87,14 +89,14 @@ def _calibration(frame: SequenceFrame) -> str:
     Pixels count from the centre of the first one, as in KITTI's own tools (drawBox3D.m adds 1 for
     MATLAB, whose first pixel's centre is (1, 1)).
     """
-    require_lens(frame.first, "kitti", *FORM.lenses)
-    k = np.array(k_of_whole_centres(frame.first.facts["K"]), np.float64)
+    k = np.array(frame.first.k_of_whole_centres, np.float64)
     lines = [_projection("P2", k, 0.0)]
     if frame.right is not None:
-        eyes = [
-            np.array(v.facts["world_from_camera_opencv"])[:3, 3] for v in (frame.first, frame.right)
-        ]
-        lines.append(_projection("P3", k, float(np.linalg.norm(eyes[1] - eyes[0]))))
+        lines.append(
+            _projection(
+                "P3", k, float(np.linalg.norm((frame.right.pose - frame.first.pose)[:3, 3]))
+            )
+        )
     return "".join(lines)
 
 
@@ -107,6 +109,12 @@ FORM = ViewForm(
     "kitti",
     write_kitti,
     "KITTI 2015: `image_2`, `image_3`, `disp_occ_0`, `disp_noc_0`, `flow_occ`, `flow_noc`, `calib`",
+    takes=Takes(
+        lambda views: views if any(map(_has_labels, views)) else [],
+        "",
+        "no view has flow or disparity",
+        "run with --stereo 0.065 --layers disparity occlusion_stereo flow_forward",
+    ),
     lenses=("pinhole",),
     layers=("disparity", "flow_forward"),
     convention=Convention(

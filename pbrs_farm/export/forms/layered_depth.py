@@ -7,16 +7,16 @@ Effects: reads views, writes files.
 
 from __future__ import annotations
 
+from itertools import count
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.errors import BadInput
-from pbrs_farm.export.chosen_view import Choice, ChosenView, require_lens
-from pbrs_farm.export.form import Convention, ViewForm, name_left_out
-from pbrs_farm.images import png_from_array
+from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.content import Content, Files, Line, write_files
+from pbrs_farm.export.form import Convention, ViewForm, with_parts
 
 _LAYERS: Final = ("depth_layers", "depth_layers_instance", "depth_layers_clear")
 _NUMBERS: Final = (1, 3, 5, 7)  # its layers of fronts; the even ones are backs
@@ -29,20 +29,16 @@ def write_layered_depth(views: list[ChosenView], out: Path, _choice: Choice) -> 
     single sheet of glass too, and the first surface that is not clear is the last. index.csv has the view of each
     number. left_out.txt names views without a picture or the layers; BadInput if none has them.
     """
-    chosen = [view for view in views if view.picture is not None and all(map(view.has, _LAYERS))]
-    if not chosen:
-        hint = f"run with --layers {' '.join(_LAYERS)}"
-        raise BadInput("--to", "layered-depth", "no view has a picture and layers", hint=hint)
-    rows = ["number,house,view\n"]
-    for number, view in enumerate(chosen):
-        require_lens(view, "layered-depth", *FORM.lenses)
-        (out / f"{number}.png").write_bytes(view.data(view.picture or ""))
-        depth, instance, clear = (view.array(name) for name in _LAYERS)
-        for layer, front in zip(_NUMBERS, front_depths(depth, instance, clear > 0), strict=True):
-            (out / f"{number}_{layer}.png").write_bytes(png_from_array(front))
-        rows.append(f"{number},{view.house.id},{view.id}\n")
-    (out / "index.csv").write_text("".join(rows), "utf-8")
-    name_left_out(out, [v for v in views if v not in chosen], "has no picture or no layers")
+    heads = {"index.csv": Line("number,house,view")}
+    write_files(out, map(_files, count(), views), heads)
+
+
+def _files(number: int, view: ChosenView) -> Files:
+    depth, instance, clear = (view.array(name) for name in _LAYERS)
+    fronts = zip(_NUMBERS, front_depths(depth, instance, clear > 0), strict=True)
+    files: dict[str, Content] = {f"{number}_{layer}.png": front for layer, front in fronts}
+    row = Line(f"{number},{view.house.id},{view.id}")
+    return files | {f"{number}.png": view.shown, "index.csv": row}
 
 
 def front_depths(
@@ -72,6 +68,7 @@ FORM = ViewForm(
     "layered-depth",
     write_layered_depth,
     "LayeredDepth: `<i>.png`, `<i>_1.png`, `_3`, `_5`, `_7`, `index.csv`",
+    takes=with_parts("layers", *_LAYERS, hint=f"run with --layers {' '.join(_LAYERS)}"),
     lenses=("pinhole",),
     layers=("depth_layers",),
     convention=Convention(None, axes="", depth="mm, along the axis"),

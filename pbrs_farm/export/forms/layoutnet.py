@@ -9,7 +9,6 @@ ceiling.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Final
 
 import numpy as np
@@ -18,13 +17,11 @@ from numpy.typing import NDArray
 from scipy import ndimage
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.panoramas import directions_of_equirect, equirect_of_directions
 from pbrs_farm.core.resampling import resized_by_area
-from pbrs_farm.export.chosen_view import Choice, ChosenView, intrinsics_of
-from pbrs_farm.export.form import Convention, ViewForm, name_left_out
-from pbrs_farm.export.sequences import pose_opencv
-from pbrs_farm.images import png_from_array
+from pbrs_farm.export.chosen_view import ChosenView
+from pbrs_farm.export.content import Files, each_view
+from pbrs_farm.export.form import Convention, Takes, ViewForm
 
 WIDTH_PX: Final = 1024
 HEIGHT_PX: Final = 512
@@ -32,7 +29,7 @@ _STRAIGHT_M: Final = 1e-3  # minimum distance of a corner from the line of its n
 _FIT: Final = "panorama with a picture in a room that encloses it"
 
 
-def write_layoutnet(views: list[ChosenView], out: Path, _choice: Choice) -> None:
+def _files(view: ChosenView) -> Files:
     """img/ (1024 x 512) and label_cor/.
 
     A label has two lines a corner, `x y_ceiling` and `x y_floor`, corner by corner to the right, the
@@ -40,27 +37,18 @@ def write_layoutnet(views: list[ChosenView], out: Path, _choice: Choice) -> None
     panoramas (lens equirect), have no picture, or are outside their room's polygon; BadInput if no view
     remains.
     """
-    shown = [view for view in views if _is_fit(view)]
-    if not shown:
-        hint = "run with --set lens.model=equirect"
-        raise BadInput("--to layoutnet", "", f"no view is a {_FIT}", hint=hint)
-    for folder in ("img", "label_cor"):
-        (out / folder).mkdir()
-    for view in shown:
-        name, axes = f"{view.house.id}__{view.id}", aligned_axes(view)
-        picture = turned_picture(view.array(view.picture or ""), axes.T @ pose_opencv(view)[:3, :3])
-        (out / "img" / f"{name}.png").write_bytes(png_from_array(picture))
-        lines = [f"{x:.3f} {y:.3f}\n" for x, y in corner_pixels(view, axes).reshape(-1, 2)]
-        (out / "label_cor" / f"{name}.txt").write_text("".join(lines), "utf-8")
-    left_out = [view for view in views if not _is_fit(view)]
-    name_left_out(out, left_out, f"has no {_FIT}")
+    axes = aligned_axes(view)
+    picture = turned_picture(view.colours, axes.T @ view.pose[:3, :3])
+    lines = [f"{x:.3f} {y:.3f}\n" for x, y in corner_pixels(view, axes).reshape(-1, 2)]
+    name = f"{view.house.id}__{view.id}"
+    return {f"img/{name}.png": picture, f"label_cor/{name}.txt": "".join(lines)}
 
 
 def _is_fit(view: ChosenView) -> bool:
-    if intrinsics_of(view.facts).lens.model != "equirect" or view.picture is None:
+    if view.intrinsics.lens.model != "equirect" or view.picture is None:
         return False
     corners = _corners(view)
-    x, _y, z = pose_opencv(view)[:3, 3]
+    x, _y, z = view.pose[:3, 3]
     polygon = shapely.Polygon(corners[:, 0, [0, 2]]) if len(corners) > 2 else shapely.Polygon()
     return bool(shapely.contains_xy(polygon, x, z))
 
@@ -87,7 +75,7 @@ def aligned_axes(view: ChosenView) -> F64:
     plan = _corners(view)[:, 0][:, [0, 2]]
     walls = np.roll(plan, -1, axis=0) - plan
     x, z = walls[np.linalg.norm(walls, axis=1).argmax()]
-    ahead = pose_opencv(view)[:3, 2]
+    ahead = view.pose[:3, 2]
     wall, yaw = np.arctan2(z, x), np.arctan2(ahead[2], ahead[0])
     heading = wall + np.pi / 2 * np.round((yaw - wall) / (np.pi / 2))
     forward, down = np.array([np.cos(heading), 0, np.sin(heading)]), np.array([0, -1.0, 0])
@@ -116,7 +104,7 @@ def turned_picture(picture: NDArray[np.uint8], aligned_from_camera: F64) -> NDAr
 
 def corner_pixels(view: ChosenView, axes: F64) -> F64:
     """(N, 2, 2) x, y of each corner's ceiling and floor, to the right from the least x."""
-    local = (_corners(view) - pose_opencv(view)[:3, 3]) @ axes
+    local = (_corners(view) - view.pose[:3, 3]) @ axes
     plane = equirect_of_directions(local.reshape(-1, 3)).reshape(-1, 2, 2)
     pixels = (plane / [2 * np.pi, np.pi] + 0.5) * [WIDTH_PX, HEIGHT_PX] - 0.5
     pixels[:, 1, 0] = pixels[:, 0, 0]  # exactly above each other
@@ -129,10 +117,16 @@ def corner_pixels(view: ChosenView, axes: F64) -> F64:
 
 FORM = ViewForm(
     "layoutnet",
-    write_layoutnet,
+    each_view(_files),
     "corners of rooms in panoramas, for LayoutNet and HorizonNet: `img/<house>__<view>.png` (1024 x 512,"
     " turned upright and along the walls), `label_cor/<house>__<view>.txt` (`x y` of ceiling and floor of"
     " each corner in turn)",
+    takes=Takes(
+        lambda views: [view for view in views if _is_fit(view)],
+        f"has no {_FIT}",
+        f"no view is a {_FIT}",
+        "run with --set lens.model=equirect",
+    ),
     lenses=("equirect",),
     convention=Convention(0.0, axes=""),
 )

@@ -10,27 +10,19 @@ from __future__ import annotations
 
 import io
 import json
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 from numpy.typing import NDArray
 from PIL import Image
-from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.export.chosen_view import (
-    Choice,
-    ChosenView,
-    depth_within_png,
-    k_of_whole_centres,
-    require_lens,
-)
-from pbrs_farm.export.form import Convention, ViewForm, name_left_out
-from pbrs_farm.export.sequences import films_of, pace_of, picture_of, pose_opencv
+from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.content import Files, parquet_bytes, write_files
+from pbrs_farm.export.form import Convention, ViewForm, frames_with
+from pbrs_farm.export.sequences import films_of, pace_of
 from pbrs_farm.images import png_from_array
 
 _FILE: Final = "chunk-{chunk:03d}/file-{file:03d}.parquet"
@@ -52,13 +44,9 @@ def write_lerobot(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     qw, camera in OpenCV's axes to the home's world, y up, metres). observation.state is the first camera's pose,
     action that of the next frame. BadInput without a film, and for films of other cameras, sizes or frames a second.
     """
-    films, stills = films_of(views)
     episodes: dict[str, dict[str, list[ChosenView]]] = {}
-    for (house, eye), frames in films.items():
+    for (house, eye), frames in films_of(views).items():
         episodes.setdefault(house, {})[eye or "first"] = frames
-    if not episodes:
-        hint = "pbrs-farm run HOME --cameras walk"
-        raise BadInput("--to", "lerobot", "no view is a frame of a sequence", hint=hint)
     _require_alike(episodes)
     first = next(iter(episodes.values()))
     features, fps = _features(first), float(pace_of(first["first"]))
@@ -68,13 +56,12 @@ def write_lerobot(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     for number, cameras in enumerate(episodes.values()):
         columns = _columns(cameras, fps, number, n_frames, stats)
         place = {"chunk": number // _FILES_A_CHUNK, "file": number % _FILES_A_CHUNK}
-        _write_table(out / "data" / _FILE.format(**place), columns, _schema(features))
+        table = parquet_bytes(columns, _schema(features))
+        write_files(out, [{f"data/{_FILE.format(**place)}": table}])
         n = len(cameras["first"])
         rows.append(_episode(number, n, n_frames, place))
         n_frames += n
-    _write_table(out / "meta/episodes" / _FILE.format(chunk=0, file=0), _by_column(rows), None)
     tasks: dict[str, list[Any]] = {"task_index": [0], "task": [_TASK]}
-    _write_table(out / "meta/tasks.parquet", tasks, _schema_of_tasks())
     info = {
         "codebase_version": "v3.0",
         "robot_type": "camera",
@@ -90,10 +77,13 @@ def write_lerobot(views: list[ChosenView], out: Path, _choice: Choice) -> None:
         "video_path": None,
         "features": features,
     }
-    (out / "meta/info.json").write_text(json.dumps(info, indent=1) + "\n", "utf-8")
-    numbers = {name: of.table() for name, of in stats.items()}
-    (out / "meta/stats.json").write_text(json.dumps(numbers, indent=1) + "\n", "utf-8")
-    name_left_out(out, stills, "is no frame of a sequence")
+    files: Files = {
+        f"meta/episodes/{_FILE.format(chunk=0, file=0)}": parquet_bytes(rows, None),
+        "meta/tasks.parquet": parquet_bytes(tasks, _schema_of_tasks()),
+        "meta/info.json": info,
+        "meta/stats.json": {name: of.table() for name, of in stats.items()},
+    }
+    write_files(out, [files])
 
 
 def _require_alike(episodes: dict[str, dict[str, list[ChosenView]]]) -> None:
@@ -102,12 +92,7 @@ def _require_alike(episodes: dict[str, dict[str, list[ChosenView]]]) -> None:
     for house, cameras in episodes.items():
         if "first" not in cameras or len({len(frames) for frames in cameras.values()}) > 1:
             raise BadInput(house, "", "lacks frames of a camera of the rig")
-        sizes = {
-            name: {(v.facts["width_px"], v.facts["height_px"]) for v in frames}
-            for name, frames in cameras.items()
-        }
-        for view in (view for frames in cameras.values() for view in frames):
-            require_lens(view, "lerobot", *FORM.lenses)
+        sizes = {name: {view.size for view in frames} for name, frames in cameras.items()}
         kind = sizes, pace_of(cameras["first"])
         wanted = wanted or kind
         if kind != wanted or any(len(size) > 1 for size in sizes.values()):
@@ -119,7 +104,7 @@ def _require_alike(episodes: dict[str, dict[str, list[ChosenView]]]) -> None:
 def _features(cameras: dict[str, list[ChosenView]]) -> dict[str, dict[str, Any]]:
     features: dict[str, dict[str, Any]] = {}
     for name, (view, *_rest) in cameras.items():
-        size = [view.facts["height_px"], view.facts["width_px"]]
+        size = [*reversed(view.size)]
         image = f"observation.images.{name}"
         features[image] = {"dtype": "image", "shape": [*size, 3], "names": _AXES}
         depth = {"dtype": "image", "shape": [*size, 1], "names": _AXES, "info": _DEPTH}
@@ -151,14 +136,16 @@ def _columns(
         image, depth = f"observation.images.{name}", f"observation.images.{name}_depth"
         columns |= {image: [], depth: []}
         for view in frames:
-            picture, millimetres = picture_of(view, "lerobot"), depth_within_png(view)
+            picture, millimetres = view.colours, view.depth_mm
             columns[image].append({"bytes": png_from_array(picture), "path": None})
             columns[depth].append({"bytes": _tiff(millimetres), "path": None})
             stats[image].add(np.moveaxis(picture / 255, -1, 0))
             stats[depth].add(millimetres[None])
-        ks = [np.ravel(k_of_whole_centres(view.facts["K"])) for view in frames]
+        ks = [np.ravel(view.k_of_whole_centres) for view in frames]
         columns[f"observation.{name}.K"] = list(np.array(ks, np.float32))
-        columns[f"observation.{name}.pose"] = [_pose(view) for view in frames]
+        columns[f"observation.{name}.pose"] = [
+            np.array(view.place_and_quaternion, np.float32) for view in frames
+        ]
     poses = columns["observation.first.pose"]
     columns |= {"observation.state": poses, "action": [*poses[1:], poses[-1]]}
     columns["timestamp"] = [np.float32(k / fps) for k in range(n)]
@@ -169,12 +156,6 @@ def _columns(
             for value in column:
                 stats[name].add(np.atleast_1d(value))
     return columns
-
-
-def _pose(view: ChosenView) -> NDArray[np.float32]:
-    pose = pose_opencv(view)
-    turn = Rotation.from_matrix(pose[:3, :3]).as_quat(canonical=True)
-    return np.array([*pose[:3, 3], *turn], np.float32)
 
 
 def _tiff(depth: NDArray[np.uint16]) -> bytes:
@@ -223,10 +204,6 @@ def _episode(number: int, n: int, first_row: int, place: dict[str, int]) -> dict
     }
 
 
-def _by_column(rows: Sequence[dict[str, Any]]) -> dict[str, list[Any]]:
-    return {name: [row[name] for row in rows] for name in rows[0]}
-
-
 def _schema(features: dict[str, dict[str, Any]]) -> pa.Schema:
     """Types of the columns: images by their bytes, vectors of a fixed length."""
     types = {"float32": pa.float32(), "int64": pa.int64()}
@@ -251,15 +228,11 @@ def _schema_of_tasks() -> pa.Schema:
     return schema.with_metadata({"pandas": json.dumps(head | {"pandas_version": "2.2.0"})})
 
 
-def _write_table(file: Path, columns: dict[str, list[Any]], schema: pa.Schema | None) -> None:
-    file.parent.mkdir(parents=True, exist_ok=True)
-    pq.write_table(pa.Table.from_pydict(columns, schema), file)
-
-
 FORM = ViewForm(
     "lerobot",
     write_lerobot,
     "LeRobot v3: an episode a walk, of each camera `observation.images.<camera>`, `_depth`, `observation.<camera>.K`, `.pose`",
+    takes=frames_with("--cameras walk"),
     lenses=("pinhole",),
     is_of_frames=True,
     convention=Convention(0, axes="OpenCV's; world y up, m", depth="mm, along the axis"),

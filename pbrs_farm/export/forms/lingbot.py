@@ -7,19 +7,17 @@ Effects: reads views, writes files.
 
 from __future__ import annotations
 
-from pathlib import Path
 from typing import Final
 
 import numpy as np
 from numpy.typing import NDArray
 
-from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.layers import LAYER
 from pbrs_farm.core.options import option
 from pbrs_farm.core.record import Record
-from pbrs_farm.export.chosen_view import Choice, ChosenView, depth_within_png, require_lens
-from pbrs_farm.export.form import Convention, ViewForm, name_left_out, write_file
-from pbrs_farm.images import png_from_array
+from pbrs_farm.export.chosen_view import ChosenView
+from pbrs_farm.export.content import Files, each_view, rows
+from pbrs_farm.export.form import Convention, Takes, ViewForm
 
 SENSORS: Final = tuple(name for name in LAYER if name.startswith("depth_sensor"))
 
@@ -34,33 +32,31 @@ class LingbotOptions(Record):
     )
 
 
-def write_lingbot(views: list[ChosenView], out: Path, choice: Choice) -> None:
-    """Write the files above.
+def files_of(view: ChosenView) -> Files:
+    """The files above of a view.
 
     raw_depth.png is the sensor's depth, uint16 mm, 0 where it has no reading: its own holes, and those of the layer
     depth_hole of that sensor if the view has it (glass, mirrors, edges ...). depth.png is the true depth, 0 for
     nothing and for 65.535 m or more. intrinsics.txt: K in pixels, three rows. left_out.txt names views without a
     picture or a sensor's depth; BadInput if none has them.
     """
-    wanted = choice.of(LingbotOptions).sensor
-    sensors = (wanted,) if wanted else SENSORS
-    left_out: list[ChosenView] = []
-    for view in views:
-        sensor = next(filter(view.has, sensors), "")
-        if not sensor or view.picture is None:
-            left_out.append(view)
-            continue
-        require_lens(view, "lingbot", *FORM.lenses)
-        folder = out / view.house.id / view.id
-        write_file(folder / "rgb.png", view.data(view.picture))
-        write_file(folder / "raw_depth.png", png_from_array(_readings(view, sensor)))
-        write_file(folder / "depth.png", png_from_array(depth_within_png(view)))
-        rows = [" ".join(f"{v:.9g}" for v in row) + "\n" for row in view.facts["K"]]
-        write_file(folder / "intrinsics.txt", "".join(rows).encode())
-    if len(left_out) == len(views):
-        hint = "run with --layers depth_sensor_d455 depth_hole_d455"
-        raise BadInput("--to", "lingbot", "no view has a picture and a sensor's depth", hint=hint)
-    name_left_out(out, left_out, "has no picture or no sensor's depth")
+    folder = f"{view.house.id}/{view.id}"
+    return {
+        f"{folder}/rgb.png": view.shown,
+        f"{folder}/raw_depth.png": _readings(view, _sensor(view)),
+        f"{folder}/depth.png": view.depth_mm,
+        f"{folder}/intrinsics.txt": rows(view.facts["K"]),
+    }
+
+
+def _sensor(view: ChosenView) -> str:
+    """The layer of the sensor's depth; "" if the view has none."""
+    wanted = view.choice.of(LingbotOptions).sensor
+    return next(filter(view.has, (wanted,) if wanted else SENSORS), "")
+
+
+def _fitting(views: list[ChosenView]) -> list[ChosenView]:
+    return [view for view in views if view.picture is not None and _sensor(view)]
 
 
 def _readings(view: ChosenView, sensor: str) -> NDArray[np.uint16]:
@@ -72,9 +68,15 @@ def _readings(view: ChosenView, sensor: str) -> NDArray[np.uint16]:
 
 FORM = ViewForm(
     "lingbot",
-    write_lingbot,
+    each_view(files_of),
     "LingBot-Depth: `<house>/<view>/rgb.png`, `raw_depth.png` (of `--sensor`, with holes), `depth.png`, `intrinsics.txt`",
     options=LingbotOptions,
+    takes=Takes(
+        _fitting,
+        "has no picture or no sensor's depth",
+        "no view has a picture and a sensor's depth",
+        "run with --layers depth_sensor_d455 depth_hole_d455",
+    ),
     lenses=("pinhole",),
     layers=SENSORS,
     convention=Convention(0.5, axes="", depth="mm, along the axis"),

@@ -17,16 +17,10 @@ from scipy.spatial.transform import Rotation
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import MaterialKind
 from pbrs_farm.core.joints import Joint, JointKind
+from pbrs_farm.export.content import numbers, write_files
 from pbrs_farm.export.form import REMARKS, HomeForm
 from pbrs_farm.export.home_bodies import BODY, Body, by_material, effort_of, word_of
-from pbrs_farm.export.home_files import (
-    digest_name,
-    numbers,
-    write_files,
-    xml_bytes,
-    z_up_points,
-    z_up_pose,
-)
+from pbrs_farm.export.home_files import digest_name, xml_bytes, z_up_points, z_up_pose
 from pbrs_farm.export.home_pieces import ExportedHome, Lamp, Piece
 from pbrs_farm.export.mujoco_rest import rest_of
 from pbrs_farm.export.obj_files import obj_of_surfaces, png_textures, rgba_of
@@ -44,7 +38,7 @@ def write_mjcf(home: ExportedHome, folder: Path) -> None:
     need("mujoco")
     model = _Model(home)
     path = folder / f"{home.house.id}.xml"
-    write_files(folder, model.files | {path.name: xml_bytes(model.root)})
+    write_files(folder, [model.files, {path.name: xml_bytes(model.root)}])
     fixed = _settle(model, path)
     if fixed:
         custom = ET.SubElement(model.root, "custom")

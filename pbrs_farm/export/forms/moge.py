@@ -9,59 +9,42 @@ Effects: reads views, writes files.
 from __future__ import annotations
 
 import json
-from pathlib import Path
 from typing import Final
 
 import numpy as np
 
 from pbrs_farm.core.arrays import F64, Bools
-from pbrs_farm.export.chosen_view import (
-    Choice,
-    ChosenView,
-    depth_metres,
-    opengl_normals_png,
-    require_lens,
-)
-from pbrs_farm.export.form import Convention, ViewForm, name_left_out, views_with_picture
-from pbrs_farm.images import jpeg_from_array, png_from_array
+from pbrs_farm.export.chosen_view import ChosenView
+from pbrs_farm.export.content import Content, Files, Line, each_view
+from pbrs_farm.export.form import PICTURES, Convention, ViewForm
+from pbrs_farm.images import png_from_array
 
 _INDEX: Final = ".index.txt"
-_QUALITY: Final = 95  # of JPEG, as its own writer
 _FIRST: Final = 1  # value of the nearest depth
 _LAST: Final = 65534  # value of the farthest depth
 _INFINITE: Final = 65535  # value of the sky; 0 is unknown
 _LEAST_RATIO: Final = 1.1  # of far to near
 
 
-def write_moge(views: list[ChosenView], out: Path, _choice: Choice) -> None:
-    """Write the files above.
+def files_of(view: ChosenView) -> Files:
+    """The files above of a view.
 
     .index.txt lists the folders, a line each. depth.png is 16 bit: near^(1 - t) far^t metres along the axis with
     t = (value - 1) / 65533, near and far in its text; 0 is unknown (beyond 65.535 m without `depth_z`), 65535 is
     infinite (nothing was hit). normal.png is 16 bit, (n + 1) / 2 in OpenGL's axes, 0 for nothing. meta.json has
     K over the picture's size. left_out.txt names views without a picture; BadInput if no view has one.
     """
-    folders: list[str] = []
-    for view in views_with_picture(views):
-        require_lens(view, "moge", *FORM.lenses)
-        folder = f"{view.house.id}/{view.id}"
-        (out / folder).mkdir(parents=True)
-        picture = jpeg_from_array(view.array(view.picture or ""), _QUALITY)
-        (out / folder / "image.jpg").write_bytes(picture)
-        (out / folder / "depth.png").write_bytes(logarithmic_png(depth_metres(view), _is_sky(view)))
-        if view.has("normal"):
-            (out / folder / "normal.png").write_bytes(png_from_array(opengl_normals_png(view)))
-        size = np.array([[view.facts["width_px"]], [view.facts["height_px"]], [1.0]])
-        meta = {"intrinsics": (np.array(view.facts["K"], np.float64) / size).tolist()}
-        (out / folder / "meta.json").write_text(json.dumps(meta), "utf-8")
-        folders.append(f"{folder}\n")
-    (out / _INDEX).write_text("".join(folders), "utf-8")
-    name_left_out(out, [view for view in views if view.picture is None], "has no picture")
-
-
-def _is_sky(view: ChosenView) -> Bools:
-    """(H, W) pixels whose ray hits nothing."""
-    return np.asarray(view.array("depth") == 0)
+    folder, (width, height) = f"{view.house.id}/{view.id}", view.size
+    k_over_size = np.array(view.facts["K"], np.float64) / [[width], [height], [1.0]]
+    files: dict[str, Content] = {
+        _INDEX: Line(folder),
+        f"{folder}/image.jpg": view.colours,
+        f"{folder}/depth.png": logarithmic_png(view.depth_m, view.array("depth") == 0),
+        f"{folder}/meta.json": json.dumps({"intrinsics": k_over_size.tolist()}),
+    }
+    if view.has("normal"):
+        files[f"{folder}/normal.png"] = view.opengl_normals_png
+    return files
 
 
 def logarithmic_png(metres: F64, is_infinite: Bools) -> bytes:
@@ -78,8 +61,9 @@ def logarithmic_png(metres: F64, is_infinite: Bools) -> bytes:
 
 FORM = ViewForm(
     "moge",
-    write_moge,
+    each_view(files_of),
     "MoGe-2: `.index.txt`, `<house>/<view>/` with `image.jpg`, `depth.png`, `normal.png`, `meta.json`",
+    takes=PICTURES,
     lenses=("pinhole",),
     convention=Convention(0.5, axes="OpenGL's", depth="logarithmic, along the axis"),
 )

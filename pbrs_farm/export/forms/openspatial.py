@@ -8,35 +8,21 @@ Effects: reads views, writes files.
 
 from __future__ import annotations
 
-from collections.abc import Iterable, Iterator
+from itertools import groupby
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 import pyarrow as pa
-import pyarrow.parquet as pq
 from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
-from pbrs_farm.export.chosen_view import (
-    Choice,
-    ChosenView,
-    depth_within_png,
-    k_of_whole_centres,
-    require_lens,
-)
-from pbrs_farm.export.form import (
-    Convention,
-    ViewForm,
-    name_left_out,
-    views_with_picture,
-    write_file,
-)
+from pbrs_farm.core.frames import Z_UP_FROM_Y_UP, affine
+from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.content import Content, Files, parquet_bytes, write_files
+from pbrs_farm.export.form import PICTURES, Convention, ViewForm
 from pbrs_farm.export.forms.hypersim import upright_box
-from pbrs_farm.export.forms.nerfstudio import Z_UP_FROM_Y_UP
 from pbrs_farm.export.nouns import noun_of
-from pbrs_farm.export.sequences import pose_opencv
-from pbrs_farm.images import png_from_array
 
 _TEXTS: Final = ("id", "image", "depth_map", "pose", "intrinsic")
 _LISTS: Final[dict[str, pa.DataType]] = {
@@ -58,56 +44,63 @@ def write_openspatial(views: list[ChosenView], out: Path, _choice: Choice) -> No
     65.535 m or more. pose: camera (OpenCV's axes) to world, z up, metres. A box is centre, size and three angles
     of scipy's "zxy" in the world; obj_tags are the nouns of captions. left_out.txt names views without a picture.
     """
-    rows = [_row(view, out) for view in views_with_picture(views)]
-    scenes: dict[str, list[dict[str, Any]]] = {}
-    for row in rows:
-        scenes.setdefault(row["scene_id"], []).append(row)
-    schema = pa.schema(list((_OF_VIEW | _OF_SCENE).items()))
-    pq.write_table(pa.Table.from_pylist(rows, schema), out / "singleview.parquet")
+    rows: list[dict[str, Any]] = []
+    write_files(out, (_files(view, rows) for view in views))
     of_views = {name: pa.list_(kind) for name, kind in _OF_VIEW.items()}
+    scenes = [list(group) for _id, group in groupby(rows, lambda row: row["scene_id"])]
     together = [
-        of_house[0] | {name: [row[name] for row in of_house] for name in _OF_VIEW}
-        for of_house in scenes.values()
+        scene[0] | {name: [row[name] for row in scene] for name in _OF_VIEW} for scene in scenes
     ]
-    schema = pa.schema(list((of_views | _OF_SCENE).items()))
-    pq.write_table(pa.Table.from_pylist(together, schema), out / "multiview.parquet")
-    name_left_out(out, [view for view in views if view.picture is None], "has no picture")
+    tables = {"singleview": (rows, _OF_VIEW), "multiview": (together, of_views)}
+    schemas = {
+        name: pa.schema(list((kinds | _OF_SCENE).items()))
+        for name, (_rows, kinds) in tables.items()
+    }
+    write_files(
+        out,
+        [
+            {
+                f"{name}.parquet": parquet_bytes(of, schemas[name])
+                for name, (of, _kinds) in tables.items()
+            }
+        ],
+    )
 
 
-def _row(view: ChosenView, out: Path) -> dict[str, Any]:
-    """The row of a view; writes its files."""
-    require_lens(view, "openspatial", *FORM.lenses)
+def _files(view: ChosenView, rows: list[dict[str, Any]]) -> Files:
+    """The files of a view; adds its row to rows."""
     place = f"{view.house.id}/{view.id}"
-    k = np.eye(4)
-    k[:3, :3] = k_of_whole_centres(view.facts["K"])
-    files = {
-        "image": (f"image/{place}.png", view.data(view.picture or "")),
-        "depth_map": (f"depth_map/{place}.png", png_from_array(depth_within_png(view))),
-        "pose": (f"pose/{place}.txt", _text(Z_UP_FROM_Y_UP @ pose_opencv(view))),
-        "intrinsic": (f"intrinsic/{place}.txt", _text(k)),
+    k = affine(view.k_of_whole_centres)
+    files: dict[str, Content] = {
+        f"image/{place}.png": view.shown,
+        f"depth_map/{place}.png": view.depth_mm,
+        f"pose/{place}.txt": _text(Z_UP_FROM_Y_UP @ view.pose),
+        f"intrinsic/{place}.txt": _text(k),
     }
-    for path, data in files.values():
-        write_file(out / path, data)
     things = [row for row in view.facts["instances"] if row.get("box3d") and view.class_of(row)]
-    return {name: path for name, (path, _data) in files.items()} | {
-        "id": place,
-        "scene_id": view.house.id,
-        "obj_tags": [noun_of(view, row) or row["class"] for row in things],
-        "bboxes_3d_world_coords": [_box(row["box3d"]) for row in things],
-        "bboxes_2d": [[*row["box2d"][:2], *(n - 1 for n in row["box2d"][2:])] for row in things],
-        "masks": list(_masks(view, things, out)),
-        "depth_scale": 1000,
-        "is_metric_depth": True,
-    }
-
-
-def _masks(view: ChosenView, rows: Iterable[dict[str, Any]], out: Path) -> Iterator[str]:
     instance = view.array("instance")
-    for row in rows:
-        path = f"masks/{view.house.id}/{view.id}/{row['id']}.png"
-        mask = np.where(instance == row["id"], np.uint8(255), np.uint8(0))
-        write_file(out / path, png_from_array(mask))
-        yield path
+    masks: dict[str, Content] = {
+        f"masks/{place}/{row['id']}.png": np.where(
+            instance == row["id"], np.uint8(255), np.uint8(0)
+        )
+        for row in things
+    }
+    rows.append(
+        {
+            **dict(zip(_TEXTS[1:], files, strict=True)),
+            "id": place,
+            "scene_id": view.house.id,
+            "obj_tags": [noun_of(view, row) or row["class"] for row in things],
+            "bboxes_3d_world_coords": [_box(row["box3d"]) for row in things],
+            "bboxes_2d": [
+                [*row["box2d"][:2], *(n - 1 for n in row["box2d"][2:])] for row in things
+            ],
+            "masks": list(masks),
+            "depth_scale": 1000,
+            "is_metric_depth": True,
+        }
+    )
+    return files | masks
 
 
 def _box(box: dict[str, Any]) -> list[float]:
@@ -115,14 +108,15 @@ def _box(box: dict[str, Any]) -> list[float]:
     return [*centre.tolist(), *size.tolist(), *Rotation.from_matrix(axes).as_euler("zxy").tolist()]
 
 
-def _text(matrix: F64) -> bytes:
-    return "".join(" ".join(f"{v:.12g}" for v in row) + "\n" for row in matrix).encode()
+def _text(matrix: F64) -> str:
+    return "".join(" ".join(f"{v:.12g}" for v in row) + "\n" for row in matrix)
 
 
 FORM = ViewForm(
     "openspatial",
     write_openspatial,
     "OpenSpatial: `singleview.parquet`, `multiview.parquet` (a row a home), `image`, `depth_map`, `pose`, `intrinsic`, `masks`",
+    takes=PICTURES,
     has_classes=True,
     lenses=("pinhole",),
     convention=Convention(0, axes="OpenCV's; world z up, m", depth="mm, along the axis"),

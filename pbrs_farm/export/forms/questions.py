@@ -8,23 +8,22 @@ Effects: reads views and their houses, writes files.
 
 from __future__ import annotations
 
-import csv
 import json
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 from typing import Any, Final
 
 import pyarrow as pa
-import pyarrow.parquet as pq
 
 from pbrs_farm.export.chosen_view import Choice, ChosenView
-from pbrs_farm.export.form import REMARKS, Convention, ViewForm, name_left_out
-from pbrs_farm.export.forms.coco import annotations_of, categories_of
+from pbrs_farm.export.content import Files, parquet_bytes, write_files
+from pbrs_farm.export.form import PICTURES, REMARKS, Convention, ViewForm
+from pbrs_farm.export.forms.coco import categories_of, compact_json, numbered_annotations
 from pbrs_farm.export.questions.asking import DATASET, Asker, Question, blind_scores
 from pbrs_farm.export.questions.clips import Clip, clips_of
 from pbrs_farm.export.questions.pairs import clips_by_home, pair_questions
-from pbrs_farm.export.questions.references import Reference, references_of
-from pbrs_farm.export.sequences import pace_of, picture_of, required_picture
+from pbrs_farm.export.questions.references import references_of
+from pbrs_farm.export.sequences import pace_of
 from pbrs_farm.formats.film_mp4 import film
 
 _SCHEMA: Final = pa.schema(
@@ -47,54 +46,43 @@ def write_questions(views: list[ChosenView], out: Path, choice: Choice) -> None:
     a picture, and models without a home, are left out. Raises BadInput for a damaged house, MachineFailed
     for walks without PyAV.
     """
-    shown = [view for view in views if view.picture is not None]
-    asker, questions, media = Asker(), [], {}
-    pictures: list[tuple[Clip, list[Reference]]] = []
-    (out / DATASET).mkdir()
-    pairs: list[Question] = []
-    for clips in clips_by_home(clips_of(shown)):
+    asker, questions, pairs = Asker(), list[Question](), list[Question]()
+    media: dict[str, str] = {}
+    pictures: list[Clip] = []
+    for clips in clips_by_home(clips_of(views)):
         for clip in clips:
-            media[clip.name] = _write_medium(clip, out)
+            media[clip.name] = f"{DATASET}/{clip.name}.{'mp4' if clip.is_walk else 'png'}"
+            write_files(out, [{media[clip.name]: _medium(clip)}])
             questions += asker.asked([clip])
-            if not clip.is_walk:
-                pictures.append((clip, references_of(clip)))
+            pictures += () if clip.is_walk else (clip,)
         pairs += pair_questions(clips, len(pairs) // 2)
     questions += pairs
-    _write_rows(questions, media, out)
-    _write_references(pictures, media, choice, out)
-    remarks = _write_blind_scores(questions, out)
-    (out / REMARKS).write_text("".join(f"{line}\n" for line in remarks), "utf-8")
-    hidden = [view for view in views if view.picture is None]
-    name_left_out(out, hidden, "has no picture")
+    scores = blind_scores(questions)
+    write_files(
+        out, [_lists(questions, media), _references(pictures, media, choice), _blind(scores)]
+    )
 
 
-def _write_medium(clip: Clip, out: Path) -> str:
+def _medium(clip: Clip) -> bytes:
     """The clip's picture or film, at the path of VSI-Bench's readers: <dataset>/<scene_name>."""
-    mode = required_picture(clip.views[0], "questions")
     if not clip.is_walk:
-        name = f"{DATASET}/{clip.name}.png"
-        (out / name).write_bytes(clip.views[0].data(mode))
-        return name
-    name = f"{DATASET}/{clip.name}.mp4"
-    frames = (picture_of(view, "questions") for view in clip.views)
-    (out / name).write_bytes(film(frames, pace_of(clip.views)))
-    return name
+        return clip.views[0].shown
+    return film((view.colours for view in clip.views), pace_of(clip.views))
 
 
-def _write_rows(questions: Sequence[Question], media: dict[str, str], out: Path) -> None:
+def _lists(questions: Sequence[Question], media: dict[str, str]) -> Files:
+    """The questions as a table, as lines and as conversations."""
     rows = [question.row(k) for k, question in enumerate(questions)]
-    pq.write_table(pa.Table.from_pylist(rows, _SCHEMA), out / "questions.parquet")
-    _write_lines(
-        (
-            row | {"media": _media_of(q, media)} | q.facts()
-            for row, q in zip(rows, questions, strict=True)
-        ),
-        out / "questions.jsonl",
-    )
-    _write_lines(
-        (_conversation(k, q, _media_of(q, media)) for k, q in enumerate(questions)),
-        out / "conversations.jsonl",
-    )
+    lines = [
+        row | {"media": _media_of(q, media)} | q.facts()
+        for row, q in zip(rows, questions, strict=True)
+    ]
+    talks = [_conversation(k, q, _media_of(q, media)) for k, q in enumerate(questions)]
+    return {
+        "questions.parquet": parquet_bytes(rows, _SCHEMA),
+        "questions.jsonl": _lines(lines),
+        "conversations.jsonl": _lines(talks),
+    }
 
 
 def _media_of(question: Question, media: dict[str, str]) -> str | list[str]:
@@ -123,74 +111,60 @@ def _conversation(number: int, question: Question, medium: str | list[str]) -> d
     }
 
 
-def _write_references(
-    pictures: Sequence[tuple[Clip, list[Reference]]],
-    media: dict[str, str],
-    choice: Choice,
-    out: Path,
-) -> None:
+def _references(pictures: Sequence[Clip], media: dict[str, str], choice: Choice) -> Files:
     """refs.json and instances.json, as RefCOCO's refs and COCO's instances."""
+    annotations = numbered_annotations(clip.views[0] for clip in pictures)
     images: list[dict[str, Any]] = []
-    annotations: list[dict[str, Any]] = []
+    phrases: dict[tuple[int, int], list[str]] = {}  # image, instance -> phrases
     refs: list[dict[str, Any]] = []
     n_sentences = 0
-    for number, (clip, references) in enumerate(pictures, start=1):
-        facts = clip.views[0].facts
-        size = {"width": facts["width_px"], "height": facts["height_px"]}
-        images.append({"id": number, "file_name": media[clip.name], **size})
-        by_instance: dict[int, list[str]] = {}
-        for reference in references:
-            by_instance.setdefault(reference.instance, []).append(reference.phrase)
-        for row in annotations_of(clip.views[0]):
-            row = {"id": len(annotations) + 1, "image_id": number, **row}
-            annotations.append(row)
-            phrases = by_instance.get(row["instance_id"], [])
-            if not phrases:
-                continue
-            sentences = [
-                {
-                    "sent_id": n_sentences + k,
-                    "sent": phrase,
-                    "raw": phrase,
-                    "tokens": phrase.split(),
-                }
-                for k, phrase in enumerate(phrases)
-            ]
-            n_sentences += len(phrases)
+    for number, clip in enumerate(pictures, start=1):
+        width, height = clip.views[0].size
+        images.append(
+            {"id": number, "file_name": media[clip.name], "width": width, "height": height}
+        )
+        for reference in references_of(clip):
+            phrases.setdefault((number, reference.instance), []).append(reference.phrase)
+    for row in annotations:
+        sentences = [
+            {"sent_id": k, "sent": phrase, "raw": phrase, "tokens": phrase.split()}
+            for k, phrase in enumerate(
+                phrases.get((row["image_id"], row["instance_id"]), ()), start=n_sentences
+            )
+        ]
+        n_sentences += len(sentences)
+        if sentences:
             refs.append(
                 {
                     "ref_id": len(refs),
                     "ann_id": row["id"],
-                    "image_id": number,
+                    "image_id": row["image_id"],
                     "category_id": row["category_id"],
-                    "file_name": media[clip.name],
+                    "file_name": images[row["image_id"] - 1]["file_name"],
                     "sent_ids": [s["sent_id"] for s in sentences],
                     "sentences": sentences,
                 }
             )
     document = {"images": images, "annotations": annotations, "categories": categories_of(choice)}
-    (out / "instances.json").write_text(json.dumps(document, separators=(",", ":")) + "\n", "utf-8")
-    (out / "refs.json").write_text(json.dumps(refs, ensure_ascii=False) + "\n", "utf-8")
+    phrases_json = json.dumps(refs, ensure_ascii=False) + "\n"
+    return {"instances.json": compact_json(document), "refs.json": phrases_json}
 
 
-def _write_blind_scores(questions: Sequence[Question], out: Path) -> list[str]:
-    scores = blind_scores(questions)
-    with (out / "blind_scores.csv").open("w", newline="", encoding="utf-8") as file:
-        writer = csv.writer(file)
-        writer.writerow(["question_type", "questions", "constant_score", "words_score"])
-        writer.writerows(
-            [kind, n, f"{constant:.3f}", f"{words:.3f}"]
-            for kind, (n, constant, words) in scores.items()
-        )
-    return [
-        f"{kind}: {n} question{'s' * (n != 1)}; without the picture, the best constant answer scores {constant:.2f}"
-        f" and the usual answer to the same words {words:.2f}"
-        for kind, (n, constant, words) in scores.items()
+def _blind(scores: dict[str, tuple[int, float, float]]) -> Files:
+    """blind_scores.csv, and a remark a kind."""
+    rows = ["question_type,questions,constant_score,words_score"]
+    rows += [f"{kind},{n},{best:.3f},{words:.3f}" for kind, (n, best, words) in scores.items()]
+    remarks = [
+        f"{kind}: {n} question{'s' * (n != 1)}; without the picture, the best constant answer scores {best:.2f}"
+        f" and the usual answer to the same words {words:.2f}\n"
+        for kind, (n, best, words) in scores.items()
     ]
+    table = "".join(f"{row}\r\n" for row in rows)
+    return {"blind_scores.csv": table, REMARKS: "".join(remarks)}
 
 
-def _write_lines(rows: Iterable[dict[str, Any]], file: Path) -> None:
-    file.write_text("".join(f"{json.dumps(row, ensure_ascii=False)}\n" for row in rows), "utf-8")
+def _lines(rows: Iterable[dict[str, Any]]) -> str:
+    return "".join(f"{json.dumps(row, ensure_ascii=False)}\n" for row in rows)
 
 
 FORM = ViewForm(
@@ -199,6 +173,7 @@ FORM = ViewForm(
     "`questions.parquet` and `questions.jsonl` (columns and kinds of VSI-Bench), `conversations.jsonl`"
     " (a record a question, as LLaVA and SIMS-V train on), `refs.json` and `instances.json` (phrases"
     " that fit a single item, as RefCOCO), `blind_scores.csv`; `pbrs_farm/<scene_name>.png`, of walks `.mp4`",
+    takes=PICTURES,
     has_classes=True,
     convention=Convention(0.5, axes=""),
 )

@@ -6,14 +6,15 @@ Effects: reads views, writes files. Every label is stored in that form already, 
 from __future__ import annotations
 
 import math
-from collections import defaultdict
 from pathlib import Path
 from typing import Final
 
 import numpy as np
 
-from pbrs_farm.export.chosen_view import Choice, ChosenView, require_lens
-from pbrs_farm.export.form import Convention, ViewForm, write_file
+from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.content import Content, Files, Line, write_files
+from pbrs_farm.export.form import Convention, ViewForm
+from pbrs_farm.export.sequences import by_house
 
 # Layer -> its path in the published data.
 FILES: Final = {
@@ -32,43 +33,35 @@ def write_released(views: list[ChosenView], out: Path, _choice: Choice) -> None:
 
     id is the view's number in its house, 0-based: its line in room_camera.txt.
     """
-    houses: dict[str, list[ChosenView]] = defaultdict(list)
-    for view in views:
-        houses[view.house.id].append(view)
-    good = []  # lines of the list of good views
-    for house, house_views in houses.items():
-        for number, view in enumerate(house_views):
-            place = {"house": house, "id": f"{number:06d}"}
-            for layer, published in FILES.items():
-                if view.has(layer):
-                    write_file(out / published.format(**place), view.data(layer))
-            good.append("{house}/{id}\n".format(**place))
-        _write_cameras(out / "camera_v2" / house, house_views)
-    (out / "data_goodlist_v2.txt").write_text("".join(good), "utf-8")
+    tables = (_files(k, v) for of_house in by_house(views).values() for k, v in enumerate(of_house))
+    write_files(out, tables)
 
 
-def _write_cameras(folder: Path, views: list[ChosenView]) -> None:
-    # A line of both camera files for each view, in the order of the views' numbers.
-    folder.mkdir(parents=True)
-    (folder / "room_camera.txt").write_text("".join(camera_line(v) for v in views), "utf-8")
-    names = "".join(f"Room#{v.entry.room_id}_{v.facts.get('sector', 0)}\n" for v in views)
-    (folder / "room_camera_name.txt").write_text(names, "utf-8")
+def _files(number: int, view: ChosenView) -> Files:
+    """The files of a view, and its lines in the lists of cameras and of good views."""
+    place = {"house": view.house.id, "id": f"{number:06d}"}
+    files: dict[str, Content] = {
+        path.format(**place): view.data(layer) for layer, path in FILES.items() if view.has(layer)
+    }
+    cameras = f"camera_v2/{view.house.id}/room_camera"
+    return files | {
+        f"{cameras}.txt": Line(camera_line(view)),
+        f"{cameras}_name.txt": Line(f"Room#{view.entry.room_id}_{view.facts.get('sector', 0)}"),
+        "data_goodlist_v2.txt": Line("{house}/{id}".format(**place)),
+    }
 
 
 def camera_line(view: ChosenView) -> str:
     """`vx vy vz  tx ty tz  ux uy uz  xf yf  value`: eye, towards, up, half angles in rad, score.
 
-    Raises BadInput for a lens other than a pinhole, as the format has no place for it. A view without a
-    score has 0. World axes and metres as in view.json.
+    A view without a score has 0. World axes and metres as in view.json.
     """
-    require_lens(view, "released", *FORM.lenses)
-    pose = np.array(view.facts["world_from_camera_opengl"], np.float64)
-    width, height = view.facts["width_px"], view.facts["height_px"]
+    pose, (width, height) = view.opengl_pose, view.size
     k = np.array(view.facts["K"], np.float64)
     # Half the fields of view, horizontal and vertical.
     half = (math.atan(width / 2 / k[0, 0]), math.atan(height / 2 / k[1, 1]))
     groups = (pose[:3, 3], -pose[:3, 2], pose[:3, 1], half, (view.facts.get("score") or 0.0,))
-    return "  ".join(" ".join(f"{x:g}" for x in group) for group in groups) + "\n"
+    return "  ".join(" ".join(f"{x:g}" for x in group) for group in groups)
 
 
 FORM = ViewForm(

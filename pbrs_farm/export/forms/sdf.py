@@ -18,23 +18,16 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.frames import Z_UP_FROM_Y_UP
 from pbrs_farm.core.house import Surface
 from pbrs_farm.core.joints import Joint, JointKind
+from pbrs_farm.export.content import numbers, write_files
 from pbrs_farm.export.form import HomeForm
 from pbrs_farm.export.home_bodies import BODY, effort_of
-from pbrs_farm.export.home_files import (
-    Z_UP,
-    convex_obj,
-    digest_name,
-    numbers,
-    write_files,
-    write_shut_remark,
-    xml_bytes,
-)
+from pbrs_farm.export.home_files import Z_UP, convex_obj, digest_name, write_shut_remark, xml_bytes
 from pbrs_farm.export.home_glb import glb_of_pieces
 from pbrs_farm.export.home_pieces import COLLIDES, ExportedHome, Lamp, Piece
 
-_Z_UP: Final = np.block([[Z_UP, np.zeros((3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]])
 _GRAVITY: Final = (0.0, 0.0, -9.81)
 _BRIGHT_CD: Final = 100.0  # candela of intensity 1, since Gazebo's pictures have no exposure
 _FAINT: Final = 0.01  # share of intensity 1 at a metre at which a light ends
@@ -49,7 +42,7 @@ _RESERVED: Final = (_BUILDING, "world")
 def write_sdf(home: ExportedHome, folder: Path) -> None:
     """<house id>.sdf and meshes/."""
     world = _World(home)
-    write_files(folder, world.meshes | {f"{home.house.id}.sdf": xml_bytes(world.document)})
+    write_files(folder, [world.meshes, {f"{home.house.id}.sdf": xml_bytes(world.document)}])
     write_shut_remark(home, folder)
 
 
@@ -169,7 +162,7 @@ def link_name(part: str) -> str:
 def _model(world: ET.Element, piece: Piece, name: str) -> tuple[ET.Element, F64]:
     """Add a model in its pose; returns it and (4, 4) the world from it."""
     model = ET.SubElement(world, "model", name=name)
-    world_from_model = _Z_UP @ piece.world_from_local @ _Z_UP.T
+    world_from_model = Z_UP_FROM_Y_UP @ piece.world_from_local @ Z_UP_FROM_Y_UP.T
     _put_pose(model, world_from_model)
     return model, world_from_model
 
@@ -195,7 +188,7 @@ def _joint(model: ET.Element, name: str, joint: Joint) -> None:
 def _shape(link: ET.Element, tag: str, name: str, uri: str, mask: int | None = None) -> None:
     """Add a visual or a collision: a mesh with y up, turned to z up; mask: of its collisions."""
     shape = ET.SubElement(link, tag, name=name)
-    _put_pose(shape, _Z_UP)
+    _put_pose(shape, Z_UP_FROM_Y_UP)
     mesh = ET.SubElement(ET.SubElement(shape, "geometry"), "mesh")
     ET.SubElement(mesh, "uri").text = uri
     if mask is not None:
@@ -217,7 +210,7 @@ def _inertial(link: ET.Element, middle: F64, mass_kg: float, tensor: F64) -> Non
 
 def _lights(link: ET.Element, name: str, lamps: Sequence[Lamp], link_from_world: F64) -> None:
     """Add lamps to their link, so that they move with it. They cast no shadow, since a bulb would hide them."""
-    link_from_home = link_from_world @ _Z_UP
+    link_from_home = link_from_world @ Z_UP_FROM_Y_UP
     for k, lamp in enumerate(lamps):
         kind = "spot" if lamp.spot else "point"
         light = ET.SubElement(link, "light", name=f"{name}_light_{k}", type=kind)

@@ -12,13 +12,13 @@ from xml.etree import ElementTree as ET
 
 import numpy as np
 
+from pbrs_farm.export.content import write_files
 from pbrs_farm.export.form import HomeForm
 from pbrs_farm.export.home_bodies import Body, Shape, by_material
 from pbrs_farm.export.home_files import (
     Z_UP,
     convex_obj,
     digest_name,
-    write_files,
     write_shut_remark,
     xml_bytes,
     z_up_points,
@@ -35,7 +35,7 @@ _MATERIALS: Final = "materials.mtl"
 def write_urdf(home: ExportedHome, folder: Path) -> None:
     """Write <house id>.urdf, meshes/ and textures/."""
     document = _Document(home)
-    write_files(folder, document.files | {f"{home.house.id}.urdf": xml_bytes(document.root)})
+    write_files(folder, [document.files, {f"{home.house.id}.urdf": xml_bytes(document.root)}])
     write_shut_remark(home, folder)
 
 

@@ -15,11 +15,11 @@ import numpy as np
 from scipy.spatial.transform import Rotation
 
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.frames import Z_UP_FROM_Y_UP
 from pbrs_farm.core.house import USUAL_CUTOFF, House, ItemKind, MaterialKind, Surface
 from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.export.form import HomeForm
 from pbrs_farm.export.home_bodies import effort_of
-from pbrs_farm.export.home_files import Z_UP
 from pbrs_farm.export.home_pieces import COLLIDES, ExportedHome, Lamp, Piece, rooms_json
 from pbrs_farm.export.passing import End, passing_pairs
 from pbrs_farm.formats.house_glb import GLTF_IMAGES, gltf_material, item_extras
@@ -27,7 +27,6 @@ from pbrs_farm.geometry.convex_parts import hull_faces
 from pbrs_farm.installation import need
 
 _SUFFIXES: Final = {"image/png": ".png", "image/jpeg": ".jpg"}
-_Z_UP: Final = np.block([[Z_UP, np.zeros((3, 1))], [np.zeros((1, 3)), np.ones((1, 1))]])
 _LEAST_RADIUS_M: Final = 0.005
 
 
@@ -70,7 +69,7 @@ class _Stage:
         if home.credit:
             self._stage.GetRootLayer().customLayerData = {"copyright": home.credit}
         root = UsdGeom.Xform.Define(self._stage, "/Home")
-        root.AddTransformOp().Set(_matrix(_Z_UP))
+        root.AddTransformOp().Set(_matrix(Z_UP_FROM_Y_UP))
         Usd.ModelAPI(root).SetKind(Kind.Tokens.assembly)
         self._stage.SetDefaultPrim(root.GetPrim())
         attribute = root.GetPrim().CreateAttribute("pbrs:rooms", Sdf.ValueTypeNames.String)
@@ -150,7 +149,7 @@ class _Stage:
         if piece.is_fixed:
             fixed = UsdPhysics.FixedJoint.Define(self._stage, f"{path}/Joint_0")
             fixed.CreateBody1Rel().SetTargets([f"{path}/Body"])
-            z_up = _Z_UP @ piece.world_from_local
+            z_up = Z_UP_FROM_Y_UP @ piece.world_from_local
             fixed.CreateLocalPos0Attr(Gf.Vec3f(*map(float, z_up[:3, 3])))
             fixed.CreateLocalRot0Attr(_quaternion(Rotation.from_matrix(z_up[:3, :3])))
             fixed.CreateLocalPos1Attr(Gf.Vec3f(0, 0, 0))

@@ -9,25 +9,19 @@ Effects: reads views, writes files.
 
 from __future__ import annotations
 
-import json
 import math
 from dataclasses import dataclass
+from itertools import chain
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
 
 from pbrs_farm.core.arrays import F32, F64
-from pbrs_farm.export.chosen_view import (
-    Choice,
-    ChosenView,
-    depth_metres,
-    k_of_whole_centres,
-    require_lens,
-)
-from pbrs_farm.export.form import Convention, ViewForm, name_left_out, views_with_picture
-from pbrs_farm.export.sequences import pose_opencv
-from pbrs_farm.images import exr_from_layers
+from pbrs_farm.export.chosen_view import Choice, ChosenView
+from pbrs_farm.export.content import Files, write_files
+from pbrs_farm.export.form import PICTURES, Convention, ViewForm
+from pbrs_farm.export.sequences import by_house
 
 _COVISIBILITY: Final = "covisibility/v0"
 _LONG_SIDE: Final = 224  # of the grid of points, pixels
@@ -44,17 +38,10 @@ def write_wai(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     the axis, 0 for nothing. The matrix has, in the row of a frame, the share of its picture that each frame sees.
     left_out.txt names views without a picture; BadInput for a lens other than a pinhole.
     """
-    shown = views_with_picture(views)
-    for house in dict.fromkeys(view.house.id for view in shown):
-        folder = out / house
-        for part in ("images", "depth", _COVISIBILITY):
-            (folder / part).mkdir(parents=True)
-        of_house = [view for view in shown if view.house.id == house]
-        rows = [_frame(view, folder) for view in of_house]
+    for house, of_house in by_house(views).items():
         matrix = pairwise_covisibility([_frame_points(view) for view in of_house])
-        n = len(rows)
-        name = f"{_COVISIBILITY}/pairwise_covisibility--{n}x{n}.npy"
-        np.save(folder / name, matrix)
+        name = f"{_COVISIBILITY}/pairwise_covisibility--{len(matrix)}x{len(matrix)}.npy"
+        rows = [_row(view) for view in of_house]
         meta = {
             "scene_name": house,
             "dataset_name": "pbrs_farm",
@@ -69,25 +56,25 @@ def write_wai(views: list[ChosenView], out: Path, _choice: Choice) -> None:
                 kind: {"frame_key": kind, "format": kind} for kind in ("image", "depth")
             },
         }
-        (folder / "scene_meta.json").write_text(json.dumps(meta, indent=1) + "\n", "utf-8")
-    name_left_out(out, [view for view in views if view.picture is None], "has no picture")
+        documents: Files = {name: matrix, "scene_meta.json": meta}
+        write_files(out / house, chain([documents], map(_files, of_house)))
 
 
-def _frame(view: ChosenView, folder: Path) -> dict[str, Any]:
-    """The frame's row; writes its picture and depth."""
-    require_lens(view, "wai", *FORM.lenses)
-    image, depth = f"images/{view.id}.png", f"depth/{view.id}.exr"
-    (folder / image).write_bytes(view.data(view.picture or ""))
-    (folder / depth).write_bytes(exr_from_layers({"Y": depth_metres(view).astype(np.float32)}))
-    k = k_of_whole_centres(view.facts["K"])
+def _files(view: ChosenView) -> Files:
+    depth = {"Y": view.depth_m.astype(np.float32)}
+    return {f"images/{view.id}.png": view.shown, f"depth/{view.id}.exr": depth}
+
+
+def _row(view: ChosenView) -> dict[str, Any]:
+    image, k, (width, height) = f"images/{view.id}.png", view.k_of_whole_centres, view.size
     return {
         "frame_name": view.id,
         "image": image,
         "file_path": image,
-        "depth": depth,
-        "transform_matrix": pose_opencv(view).tolist(),
-        "h": view.facts["height_px"],
-        "w": view.facts["width_px"],
+        "depth": f"depth/{view.id}.exr",
+        "transform_matrix": view.pose.tolist(),
+        "h": height,
+        "w": width,
         "fl_x": k[0][0],
         "fl_y": k[1][1],
         "cx": k[0][2],
@@ -107,7 +94,7 @@ class FramePoints:
 
 
 def _frame_points(view: ChosenView) -> FramePoints:
-    depth, pose = depth_metres(view), pose_opencv(view)
+    depth, pose = view.depth_m, view.pose
     k = np.array(view.facts["K"], np.float64)
     height, width = depth.shape
     scale = min(1.0, _LONG_SIDE / max(height, width))
@@ -182,6 +169,7 @@ FORM = ViewForm(
     "MapAnything: `<house>/scene_meta.json`, `images`, `depth/*.exr`, `covisibility/v0` (the share of each frame's"
     " picture that each other sees); with `--split` lists of scenes",
     finish=write_scene_lists,
+    takes=PICTURES,
     lenses=("pinhole",),
     convention=Convention(0, axes="OpenCV's; world y up, m", depth="m, along the axis"),
 )

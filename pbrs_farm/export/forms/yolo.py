@@ -10,62 +10,47 @@ from typing import Any, Final
 from pbrs_farm.core.classes import CEILING, FLOOR, WALL
 from pbrs_farm.core.house_split import SPLITS
 from pbrs_farm.export.chosen_view import Choice, ChosenView
-from pbrs_farm.export.form import Convention, ViewForm, name_left_out, views_with_picture
+from pbrs_farm.export.content import Content, Files, each_view
+from pbrs_farm.export.form import PICTURES, Convention, ViewForm, WriteViews
 
 # classes without boxes: they surround the picture
 _NO_BOX: Final = (0, WALL, FLOOR, CEILING)
 
 
-def write_yolo(views: list[ChosenView], out: Path, _choice: Choice) -> None:
-    """images/<house>__<view>.png and labels/<house>__<view>.txt.
+def pictures_beside(
+    folder: str, label_of: Callable[[ChosenView], tuple[str, Content]]
+) -> WriteViews:
+    """The writer of images/<house>__<view>.png and <folder>/<house>__<view><suffix>.
 
-    A line is a box: class (NYU40 id - 1; of a user's table its place among the ids), centre x, y,
-    width, height, as shares of the picture. Views without a picture are left out, and named in
-    left_out.txt.
-    """
-    write_pictures_and_labels(views, out, _box_lines)
-
-
-def write_pictures_and_labels(
-    views: list[ChosenView], out: Path, lines_of: Callable[[ChosenView], Iterable[str]]
-) -> None:
-    """images/ and labels/ with the lines of each picture."""
-
-    def label(view: ChosenView) -> tuple[str, bytes]:
-        return ".txt", "".join(lines_of(view)).encode()
-
-    write_pictures_beside(views, out, "labels", label)
-
-
-def write_pictures_beside(
-    views: list[ChosenView],
-    out: Path,
-    folder: str,
-    label_of: Callable[[ChosenView], tuple[str, bytes]],
-) -> None:
-    """images/<house>__<view>.png and <folder>/<house>__<view><suffix>.
-
-    label_of: the suffix and the bytes of a view's label. Views without a picture are left out, and
+    label_of: the suffix and the content of a view's label. Views without a picture are left out, and
     named in left_out.txt.
     """
-    shown = views_with_picture(views)
-    for name in ("images", folder):
-        (out / name).mkdir()
-    for view in shown:
+
+    def files_of(view: ChosenView) -> Files:
         name = f"{view.house.id}__{view.id}"
-        suffix, data = label_of(view)
-        (out / "images" / f"{name}.png").write_bytes(view.data(view.picture or ""))
-        (out / folder / f"{name}{suffix}").write_bytes(data)
-    without = [view for view in views if view.picture is None]
-    name_left_out(out, without, "has no picture")
+        suffix, label = label_of(view)
+        return {f"images/{name}.png": view.shown, f"{folder}/{name}{suffix}": label}
+
+    return each_view(files_of)
 
 
-def _box_lines(view: ChosenView) -> Iterable[str]:
-    width, height = view.facts["width_px"], view.facts["height_px"]
+def box_lines(view: ChosenView) -> tuple[str, str]:
+    """labels/<house>__<view>.txt: a line a box.
+
+    A line has the class (NYU40 id - 1; of a user's table its place among the ids), and centre x, y,
+    width, height, as shares of the picture.
+    """
+    (width, height), lines = view.size, []
     for number, row in numbered_objects(view):
         x0, y0, x1, y1 = row["box2d"]
         box = ((x0 + x1) / 2 / width, (y0 + y1) / 2 / height, (x1 - x0) / width, (y1 - y0) / height)
-        yield f"{number} " + " ".join(f"{share:.6f}" for share in box) + "\n"
+        lines.append(object_line(number, box))
+    return ".txt", "".join(lines)
+
+
+def object_line(number: int, shares: Iterable[float]) -> str:
+    """A line of a label: an object's class and shares of the picture."""
+    return f"{number} " + " ".join(f"{share:.6f}" for share in shares) + "\n"
 
 
 def numbered_objects(view: ChosenView) -> Iterable[tuple[int, dict[str, Any]]]:
@@ -116,10 +101,11 @@ def write_yaml(out: Path, splits: tuple[str, ...], fields: list[str]) -> None:
 
 FORM = ViewForm(
     "yolo",
-    write_yolo,
+    pictures_beside("labels", box_lines),
     "`images/<house>__<view>.png`, `labels/<house>__<view>.txt` (boxes; class = NYU40 id - 1; none for"
     " wall, floor, ceiling), `data.yaml`, which works from any directory; if `train` or `val` has no home,"
     " both name the same folder, and a comment says so",
+    takes=PICTURES,
     has_classes=True,
     finish=write_data_yaml,
     convention=Convention(0.5, axes="shares of the picture, from its corner"),

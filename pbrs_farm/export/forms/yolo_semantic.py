@@ -9,12 +9,12 @@ from pathlib import Path
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.export.chosen_view import Choice, ChosenView
-from pbrs_farm.export.form import Convention, ViewForm
-from pbrs_farm.export.forms.yolo import names_lines, write_pictures_beside, write_yaml
-from pbrs_farm.images import png_from_array
+from pbrs_farm.export.form import PICTURES, Convention, ViewForm
+from pbrs_farm.export.forms.yolo import names_lines, pictures_beside, write_yaml
 
 _IGNORED: Final = 255  # mask value without loss or metric
 
@@ -31,10 +31,10 @@ def write_yolo_semantic(views: list[ChosenView], out: Path, choice: Choice) -> N
     number = np.full(max(choice.class_names) + 1, _IGNORED, np.uint8)
     number[list(choice.class_names)] = np.arange(len(choice.class_names))
 
-    def mask(view: ChosenView) -> tuple[str, bytes]:
-        return ".png", png_from_array(number[view.array("semantic")])
+    def mask(view: ChosenView) -> tuple[str, NDArray[np.uint8]]:
+        return ".png", number[view.array("semantic")]
 
-    write_pictures_beside(views, out, "masks", mask)
+    pictures_beside("masks", mask)(views, out, choice)
 
 
 def write_semantic_yaml(out: Path, splits: tuple[str, ...], choice: Choice) -> None:
@@ -46,6 +46,7 @@ FORM = ViewForm(
     "yolo-semantic",
     write_yolo_semantic,
     "`images/<house>__<view>.png`, `masks/<house>__<view>.png` (NYU40 id - 1; 255 = no class), `data.yaml` with `masks_dir`",
+    takes=PICTURES,
     has_classes=True,
     finish=write_semantic_yaml,
     convention=Convention(None, axes=""),

@@ -21,10 +21,10 @@ from scipy.spatial import cKDTree
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, Room
 from pbrs_farm.core.record import read_csv
-from pbrs_farm.export.chosen_view import ChosenView, intrinsics_of
+from pbrs_farm.export.chosen_view import ChosenView
 from pbrs_farm.export.export_homes import stored_house
 from pbrs_farm.export.nouns import is_plural, noun_of
-from pbrs_farm.export.sequences import frames_by_house, pose_opencv
+from pbrs_farm.export.sequences import frames_by_house
 from pbrs_farm.geometry.surface_points import item_triangles, surface_points
 
 LEAST_FRACTION: Final = 0.003
@@ -73,10 +73,10 @@ class Thing:
 
     def share_within(self, view: ChosenView) -> float:
         """The share of its surface within the picture's edges, occluded or not."""
-        facts, pose = view.facts, pose_opencv(view)
-        x, y = intrinsics_of(facts).pixels((self._sparse_points - pose[:3, 3]) @ pose[:3, :3]).T
+        pose, (width, height) = view.pose, view.size
+        x, y = view.intrinsics.pixels((self._sparse_points - pose[:3, 3]) @ pose[:3, :3]).T
         # NaN (outside the lens) compares false.
-        within = (x >= 0) & (x <= facts["width_px"]) & (y >= 0) & (y <= facts["height_px"])
+        within = (x >= 0) & (x <= width) & (y >= 0) & (y <= height)
         return float(within.mean()) if len(within) else 0.0
 
     @cached_property
@@ -165,25 +165,19 @@ class Clip:
     @cached_property
     def rooms_entered(self) -> list[Room]:
         """The rooms entered by the camera, in the house's order."""
-        eyes = np.array([pose_opencv(view)[:3, 3] for view in self.views])
+        return [room for room in self.house.rooms if any(self._is_in(room))]
+
+    def _is_in(self, room: Room) -> list[bool]:
+        """Of each view, whether its camera is in a room."""
+        polygon = shapely.Polygon(room.polygon)
         return [
-            room
-            for room in self.house.rooms
-            if any(
-                room.floor_y <= y <= room.ceiling_y
-                and shapely.Polygon(room.polygon).contains(shapely.Point(x, z))
-                for x, y, z in eyes
-            )
+            bool(room.floor_y <= y <= room.ceiling_y and polygon.contains(shapely.Point(x, z)))
+            for x, y, z in (view.pose[:3, 3] for view in self.views)
         ]
 
     def visits_of(self, room: Room, least_frames: int) -> int:
         """Number of stays of the camera in a room; 0 if a stay or an absence is shorter than least_frames."""
-        polygon = shapely.Polygon(room.polygon)
-        is_in = [
-            bool(room.floor_y <= y <= room.ceiling_y and polygon.contains(shapely.Point(x, z)))
-            for x, y, z in (pose_opencv(view)[:3, 3] for view in self.views)
-        ]
-        runs = [(inside, len(list(run))) for inside, run in groupby(is_in)]
+        runs = [(inside, len(list(run))) for inside, run in groupby(self._is_in(room))]
         is_clear = all(n_frames >= least_frames for _inside, n_frames in runs)
         return sum(inside for inside, _n in runs) if is_clear else 0
 

@@ -28,7 +28,6 @@ from pbrs_farm.export.questions.kinds import (
     is_clearly_nearer,
     side_of,
 )
-from pbrs_farm.export.sequences import pose_opencv
 
 _MOST_PAIRS: Final = 400  # subjects of a home, for each kind
 _OF_A_PICTURE: Final = 2  # questions of a kind about a picture, in all of its pairs
@@ -249,7 +248,7 @@ def _worded(
 
 def _nearer(clip: Clip, things: Things) -> str:
     """The item nearer to the camera, by the nearest points of their surfaces."""
-    eye = pose_opencv(clip.views[0])[:3, 3]
+    eye = clip.views[0].pose[:3, 3]
     (near, noun), (far, _) = sorted((float(t.points.query(eye)[0]), t.noun) for t in things)
     return noun if is_clearly_nearer(near, far) else ""
 
@@ -293,7 +292,7 @@ def _lit_side(clip: Clip, lamps: Sequence[Thing]) -> str:
 
 def _turn(one: Subject, two: Subject, _rng: random.Random) -> Iterator[PairDraft]:
     """The side to which the camera turns from the first picture to the second."""
-    first, second = (pose_opencv(clip.views[0])[[0, 2], 2] for clip in one)
+    first, second = (clip.views[0].pose[[0, 2], 2] for clip in one)
     bearing = bearing_deg(np.zeros(2), first, second)
     if _LEAST_TURN_DEG <= abs(bearing) <= _MOST_TURN_DEG:
         yield PairDraft({}, ("right", "left") if bearing > 0 else ("left", "right"), ((), ()))
@@ -301,7 +300,7 @@ def _turn(one: Subject, two: Subject, _rng: random.Random) -> Iterator[PairDraft
 
 def _moved(one: Subject, two: Subject, _rng: random.Random) -> Iterator[PairDraft]:
     """The distance between the cameras of two pictures."""
-    eyes = [[pose_opencv(clip.views[0])[:3, 3] for clip in subject] for subject in (one, two)]
+    eyes = [[clip.views[0].pose[:3, 3] for clip in subject] for subject in (one, two)]
     far = [float(np.linalg.norm(b - a)) for a, b in eyes]
     near, farther = sorted(far)
     if near >= _MOVED_M and farther >= _FARTHER * near:
