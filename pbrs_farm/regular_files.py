@@ -12,11 +12,12 @@ import hashlib
 import os
 import shutil
 import stat
+import tomllib
 from collections.abc import Iterator
 from contextlib import contextmanager
 from io import BufferedReader
 from pathlib import Path
-from typing import Final
+from typing import Any, Final
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.file_kinds import HEAD_BYTES, other_kind, wrong_kind
@@ -103,6 +104,16 @@ def _kind_at(path: Path) -> tuple[str, str]:
             return wrong_kind(file.read(HEAD_BYTES), path)
     except OSError:
         return "", ""
+
+
+def toml_given(path: Path) -> dict[str, Any]:
+    """Read the tables of a TOML file given by the user, like text_given; raises BadInput if it is no TOML."""
+    text = text_given(path)
+    try:
+        return tomllib.loads(text)
+    # RecursionError: brackets within brackets; ValueError: also an integer of thousands of digits.
+    except (ValueError, RecursionError) as error:
+        raise BadInput(path, "", f"is not valid TOML: {error}") from None
 
 
 def text_from_bytes(data: bytes, errors: str = "strict") -> str:

@@ -14,7 +14,6 @@ out = "shards"
 from __future__ import annotations
 
 import argparse
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
@@ -22,7 +21,7 @@ from typing import Any
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.options import flag, values_of_table
 from pbrs_farm.core.shown_text import did_you_mean
-from pbrs_farm.regular_files import text_given
+from pbrs_farm.regular_files import toml_given
 
 _TABLES = ("render", "select", "pack")
 
@@ -35,21 +34,14 @@ def job_file(words: list[str]) -> dict[str, Any] | None:
     """
     if len(words) != 1 or not words[0].endswith(".toml") or not Path(words[0]).is_file():
         return None
-    job = _tables(words[0])
+    job = toml_given(Path(words[0]))
     # The programme of a made home is TOML, too, but lists no homes.
     return _checked(job, words[0]) if "homes" in job else None
 
 
 def job_like(file: str, homes: list[str]) -> dict[str, Any]:
     """The job of a template; homes, if any, replace those of its file. BadInput as job_file."""
-    return _checked({**_tables(file), "homes": homes}, file)
-
-
-def _tables(file: str) -> dict[str, Any]:
-    try:
-        return tomllib.loads(text_given(Path(file)))
-    except (tomllib.TOMLDecodeError, ValueError, RecursionError) as error:
-        raise BadInput(file, "", f"is not valid TOML: {error}") from None
+    return _checked({**toml_given(Path(file)), "homes": homes}, file)
 
 
 def _checked(job: dict[str, Any], file: str) -> dict[str, Any]:

@@ -10,8 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.checked_json import Finite, checked
-from pbrs_farm.core.errors import BadInput
-from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular
+from pbrs_farm.regular_files import MAX_TEXT_BYTES, read_given
 
 _Focal = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 _Pixels = Annotated[int, Field(gt=0, le=16384)]
@@ -30,10 +29,7 @@ class _BopCamera(BaseModel):
 
 def camera_of_bop(path: Path) -> tuple[tuple[int, int], F64]:
     """((width, height), K) of a camera.json, K relative to the first pixel's centre; BadInput."""
-    try:
-        data = read_regular(path, MAX_TEXT_BYTES)
-    except OSError as error:
-        raise BadInput(path, "", fault_of(error)) from None
+    data = read_given(path, MAX_TEXT_BYTES)
     c = checked(_BopCamera, data, path, hint="fx, fy, cx, cy, width, height")
     # Ours counts from the picture's corner: half a pixel more.
     k = np.array([[c.fx, 0, c.cx + 0.5], [0, c.fy, c.cy + 0.5], [0, 0, 1]], np.float64)

@@ -10,19 +10,16 @@ spp = 128
 from __future__ import annotations
 
 import json
-import tomllib
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, Final
 
-from pbrs_farm.core.errors import BadRecipe
-from pbrs_farm.core.file_kinds import other_kind, wrong_kind
+from pbrs_farm.core.errors import BadInput, BadRecipe
 from pbrs_farm.core.recipe import RECIPE_NAMES, Recipe, changed_recipe
 from pbrs_farm.core.shown_text import hint_of_choice, shown
-from pbrs_farm.regular_files import fault_of, read_regular, text_from_bytes
+from pbrs_farm.regular_files import toml_given
 
 ENDING: Final = ".toml"
-_MAX_BYTES: Final = 2**20
 
 
 def recipe_from_toml(path: Path, overrides: Mapping[str, str]) -> Recipe:
@@ -33,17 +30,9 @@ def recipe_from_toml(path: Path, overrides: Mapping[str, str]) -> Recipe:
     file that cannot be read, is no TOML, is too large, or sets what no recipe has.
     """
     try:
-        data = read_regular(path, _MAX_BYTES)
-    except OSError as error:
-        raise BadRecipe(f"{path}: {fault_of(error)}") from None
-    if other_kind(data, path) is not None:
-        text, hint = wrong_kind(data, path)
-        raise BadRecipe(f"{path}: {text}", hint=hint)
-    try:
-        fields = tomllib.loads(text_from_bytes(data))
-    # ValueError: not UTF-8, no TOML, or an integer of thousands of digits.
-    except (ValueError, RecursionError) as error:
-        raise BadRecipe(f"{path}: is not valid TOML: {error}") from None
+        fields = toml_given(path)
+    except BadInput as error:
+        raise BadRecipe(error.message, hint=error.hint) from None
     base = fields.pop("recipe", "fast")
     if not isinstance(base, str) or base not in RECIPE_NAMES:
         hint = hint_of_choice(str(base), RECIPE_NAMES)

@@ -54,7 +54,7 @@ from pbrs_farm.prepare.open_joints import keyed, opened, with_motions
 from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.read.common.material_library import texture_from_bytes
 from pbrs_farm.read.objects.own_model import model_shape
-from pbrs_farm.regular_files import MAX_DIGEST_BYTES, fault_of, read_regular
+from pbrs_farm.regular_files import MAX_DIGEST_BYTES, read_given
 
 
 def apply_edits(house: House, source: SourceRef, fields: ReadFields) -> House:
@@ -347,10 +347,7 @@ def _found(house: House, ids: Collection[str]) -> None:
 
 
 def _file(path: str, sha256: str) -> bytes:
-    try:
-        data = read_regular(Path(path), MAX_DIGEST_BYTES)
-    except OSError as error:
-        raise BadInput(path, "", fault_of(error)) from None
+    data = read_given(Path(path), MAX_DIGEST_BYTES)
     if keys.sha256(data) != sha256:
         raise BadInput(path, "", "changed since the home was loaded", hint="load the home again")
     return data

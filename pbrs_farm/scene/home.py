@@ -64,7 +64,7 @@ from pbrs_farm.dress.style import check_style
 from pbrs_farm.formats.cameras_json import views_from_json
 from pbrs_farm.prepare.source import SAVED_SUFFIX, resolve, saved_home, variants
 from pbrs_farm.prepare.source_ref import SourceRef
-from pbrs_farm.regular_files import MAX_DIGEST_BYTES, fault_of, read_regular
+from pbrs_farm.regular_files import MAX_DIGEST_BYTES, fault_of, read_given
 from pbrs_farm.run import plan
 from pbrs_farm.sample.camera_report import CameraReport
 from pbrs_farm.scene.models import Model
@@ -567,10 +567,7 @@ class Home:
         False
         """
         path = Path(picture)
-        try:
-            data = read_regular(path, MAX_DIGEST_BYTES)
-        except OSError as error:
-            raise BadInput(path, "", fault_of(error)) from None
+        data = read_given(path, MAX_DIGEST_BYTES)
         edit = CoverItems(
             items=self._ids(items),
             path=str(path.resolve()),

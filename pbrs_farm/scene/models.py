@@ -21,7 +21,7 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.core.shown_text import hint_of_choice
 from pbrs_farm.read.common.furniture_classes import nyu40_of
 from pbrs_farm.read.objects.own_model import SUFFIXES, ModelShape, companions_digest, model_shape
-from pbrs_farm.regular_files import MAX_SCENE_BYTES, fault_of, read_regular
+from pbrs_farm.regular_files import MAX_SCENE_BYTES, read_given
 
 UNITS: Final = {"m": 1.0, "cm": 0.01, "mm": 0.001, "inch": 0.0254}
 _UP: Final = {
@@ -126,10 +126,7 @@ def model(
     up = up or ("y" if path.suffix.lower() in (".glb", ".gltf", ".obj") else "z")
     if up not in _UP:
         raise BadInput("up", up, "no such axis", hint="of x, y, z")
-    try:
-        data = read_regular(path, MAX_SCENE_BYTES)
-    except OSError as error:
-        raise BadInput(path, "", fault_of(error)) from None
+    data = read_given(path, MAX_SCENE_BYTES)
     label = nyu40_of("", category) or nyu40_of("", path.stem) or OTHERPROP
     ref = ModelRef(
         path=str(path.resolve()),

@@ -192,7 +192,7 @@ def test_a_recipe_written_as_a_file_is_read_as_itself(name: str, tmp_path: Path)
     [
         (None, "no such file"),
         ("[light", "is not valid TOML"),
-        ("\xff\xff", "is not valid TOML"),
+        ("\xff\xff", "is not UTF-8 text"),
         (f"[light]\nspp = {'9' * 5000}", "is not valid TOML"),
         ('recipe = "fst"', "did you mean fast?"),
         ("recipe = 3", "no recipe 3"),

@@ -31,13 +31,7 @@ from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.objects.model_folders import ObjectModel
 from pbrs_farm.read.objects.single_object import model_surfaces, object_companions
-from pbrs_farm.regular_files import (
-    MAX_SCENE_BYTES,
-    fault_of,
-    naming_kind,
-    open_regular,
-    read_regular,
-)
+from pbrs_farm.regular_files import MAX_SCENE_BYTES, naming_kind, open_regular, read_given
 
 SUFFIXES: Final = (".glb", ".gltf", ".obj", ".ply", ".stl", ".off")
 MAX_EXTENT_M: Final = 100.0
@@ -82,10 +76,7 @@ def model_shape(model: ModelRef, fields: ReadFields) -> ModelShape:
     than 100 m or smaller than .1 mm, with more triangles than the recipe allows.
     """
     path = Path(model.path)
-    try:
-        data = read_regular(path, MAX_SCENE_BYTES)
-    except OSError as error:
-        raise BadInput(path, "", fault_of(error)) from None
+    data = read_given(path, MAX_SCENE_BYTES)
     if (keys.sha256(data), companions_digest(path)) != (model.sha256, model.companions):
         raise BadInput(path, "", "changed since the home was loaded", hint="load the home again")
     notes = Notes(path.name, strict=fields.strict)
