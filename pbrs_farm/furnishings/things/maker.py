@@ -12,8 +12,9 @@ methods of shapes.py or by `add`:
 
 A function without a decorator is a shared part; it takes the maker too. With `@family` a function
 describes furniture of the generated catalogue: it also takes the size that was drawn for a
-variation, and its parameters if it has some (parameters.py). pbrs_farm.plugin exports these names
-for other packages.
+variation, and its parameters if it has some (parameters.py). Our own families have their facts in
+families.csv (catalogued.py), forms that only state numbers are rows of forms.csv (forms.py).
+pbrs_farm.plugin exports these names for other packages.
 
 Metres, y up. Furniture has its back at -z and its front at +z; wall items have their back at z = 0. The
 order of draws decides the result of a seed: an inserted draw changes all later ones.
