@@ -23,6 +23,7 @@ STOREY_M: Final = 3.0
 
 _REVEAL_M: Final = 0.17  # that windows lie behind their front
 _EAVES_M: Final = 0.45
+_LIT: Final = 0.3  # share of windows with light behind them
 _PLINTH_M: Final = 0.5
 _DOOR_M: Final = (1.15, 2.45)
 _PAINTS: Final[tuple[Rgb, ...]] = ((0.55, 0.56, 0.58), (0.03, 0.03, 0.035), (0.20, 0.21, 0.22),
@@ -77,7 +78,7 @@ class _Holes(NamedTuple):
 
 
 def block(front: Front, facade: Facade, rooms: SceneryMaterial, n_bays: int, n_storeys: int, *,
-    depth_m: float = 10.0, is_lit: float = 0.3, has_balconies: bool = False) -> None:
+    depth_m: float = 10.0, has_balconies: bool = False) -> None:
     """A building of several storeys: a front with windows, sides, a roof and what sticks out.
 
     rooms: the look of `lit_rooms`, for windows of lit rooms.
@@ -87,7 +88,7 @@ def block(front: Front, facade: Facade, rooms: SceneryMaterial, n_bays: int, n_s
     _body(front, facade, width, top, depth_m)
     share = facade.style.balconies if has_balconies else 0.0
     holes = _front(front, facade, n_bays, n_storeys, share)
-    _lit_windows(front, holes, rooms, is_lit)
+    _lit_windows(front, holes, rooms)
     cornice = facade.style.cornice_m
     front.box(facade.trim, -0.1, width + 0.1, top - 0.1, top + 0.22, -0.1, cornice)
     front.box(facade.trim, -0.05, width + 0.05, top - 0.32, top - 0.1, -0.1, 0.45 * cornice)
@@ -103,7 +104,7 @@ def block(front: Front, facade: Facade, rooms: SceneryMaterial, n_bays: int, n_s
         _balcony(front, facade, holes.left[k] - 0.35, holes.right[k] + 0.35, holes.low[k] - 0.1)
 
 
-def house(front: Front, facade: Facade, rooms: SceneryMaterial, *, is_lit: float = 0.3) -> None:
+def house(front: Front, facade: Facade, rooms: SceneryMaterial) -> None:
     """A house of one or two storeys with a gable."""
     rng = front.rng
     n_bays, n_storeys = int(rng.integers(3, 5)), int(rng.integers(1, 3))
@@ -112,7 +113,7 @@ def house(front: Front, facade: Facade, rooms: SceneryMaterial, *, is_lit: float
     ridge = top + rng.uniform(0.32, 0.48) * width if rng.random() < 0.5 else 0.0
     _body(front, facade, width, top, depth)
     holes = _front(front, facade, n_bays, n_storeys, 0.0)
-    _lit_windows(front, holes, rooms, is_lit)
+    _lit_windows(front, holes, rooms)
     front.box(_IRON, width - 0.22, width - 0.12, 0, top, 0.02, 0.12)
     if not ridge:
         _roof(front, facade, width, top, depth)
@@ -237,9 +238,9 @@ def _balcony(front: Front, facade: Facade, s0: float, s1: float, floor: float) -
         front.add(_IRON, sides)
 
 
-def _lit_windows(front: Front, holes: _Holes, rooms: SceneryMaterial, share: float) -> None:
+def _lit_windows(front: Front, holes: _Holes, rooms: SceneryMaterial) -> None:
     """Light behind a share of the windows, in both halves of their frames."""
-    on = np.flatnonzero(front.rng.random(len(holes.left)) < share)
+    on = np.flatnonzero(front.rng.random(len(holes.left)) < _LIT)
     room = front.rng.integers(0, N_ROOMS, len(on))
     left, low, right, high = holes.left[on], holes.low[on], holes.right[on], holes.high[on]
     frame = 0.075 * (right - left)

@@ -10,6 +10,8 @@ from pbrs_farm.dress.style import Rgb
 from pbrs_farm.dress.surface_maps import SurfaceMaps
 from pbrs_farm.furnishings.textures.canvas import Canvas
 
+_THREADS_M = 500.0  # threads of cloth a metre, or as many as the picture can show
+
 
 def paint_maps(c: Canvas, tint: Rgb) -> SurfaceMaps:
     """Wall paint put on by a roller: one tint, faintly clouded, with the roller's stipple."""
@@ -69,18 +71,10 @@ def carpet_maps(c: Canvas, tint: Rgb, *, loops: bool) -> SurfaceMaps:
 
 
 def weave_maps(
-    c: Canvas,
-    tint: Rgb,
-    *,
-    threads_m: float = 500.0,
-    second: Rgb | None = None,
-    twill: bool = False,
+    c: Canvas, tint: Rgb, *, second: Rgb | None = None, twill: bool = False
 ) -> SurfaceMaps:
-    """Woven cloth: warp and weft over and under each other. second: colour of the weft.
-
-    threads_m: threads a metre, as many as the picture can show.
-    """
-    n = max(8, round(min(threads_m, c.shape[1] / c.size_m[0] / 3.2) * c.size_m[0]) // 4 * 4)
+    """Woven cloth: warp and weft over and under each other. second: colour of the weft."""
+    n = max(8, round(min(_THREADS_M, c.shape[1] / c.size_m[0] / 3.2) * c.size_m[0]) // 4 * 4)
     y = ((np.arange(c.shape[0], dtype=np.float32) + 0.5) / c.shape[0] * n)[:, None]
     x = ((np.arange(c.shape[1], dtype=np.float32) + 0.5) / c.shape[1] * n)[None]
     # Let the warp lie on top in every other crossing, or in twos along a diagonal.

@@ -15,7 +15,7 @@ from pbrs_farm.dress.noise import coverage, halved, noise, sampled, smoothstep
 from pbrs_farm.dress.style import Rgb, Wood, mix, shade
 from pbrs_farm.dress.surface_maps import SurfaceMaps, ramp
 from pbrs_farm.furnishings.textures.canvas import Canvas
-from pbrs_farm.furnishings.textures.wood_sheet import WoodSheet, wood_sheet
+from pbrs_farm.furnishings.textures.wood_sheet import wood_sheet
 
 _INTS = NDArray[np.int64]
 
@@ -125,15 +125,10 @@ class PlankLook:
 
 
 def plank_maps(
-    c: Canvas,
-    wood: Wood,
-    layout: BoardLayout,
-    look: PlankLook,
-    darkness: float = 0.0,
-    sheet: WoodSheet | None = None,
+    c: Canvas, wood: Wood, layout: BoardLayout, look: PlankLook, darkness: float = 0.0
 ) -> SurfaceMaps:
     """Wood cut into the layout's planks. darkness: -1 bleached .. 1 stained."""
-    sheet = wood_sheet(c.rng, wood, (512, c.shape[1]), c.pixel_m) if sheet is None else sheet
+    sheet = wood_sheet(c.rng, wood, (512, c.shape[1]), c.pixel_m)
     n = layout.n_planks
     # Cut each plank from a different place, half of them turned round.
     rows = _start_of_planks(c.rng, layout.across, layout.plank, n, sheet.shape[0])
@@ -171,14 +166,14 @@ def _start_of_planks(
     return np.asarray(pixels.astype(np.int32) * turn[plank] + start[plank], np.int32)
 
 
-def grain_maps(c: Canvas, wood: Wood, roughness: float = 0.4) -> SurfaceMaps:
+def grain_maps(c: Canvas, wood: Wood) -> SurfaceMaps:
     """Veneer without joints, the grain along u, for furniture.
 
     The sheet is laid narrower than it is drawn: rings of veneer are half as wide as those of planks.
     """
     sheet = wood_sheet(c.rng, wood, (c.shape[1], c.shape[1]), c.pixel_m)
     colour = ramp(sheet.tone, wood.dark, wood.light)
-    return c.maps(colour, roughness + 0.12 * (0.62 - sheet.tone), 0.00005 * sheet.tone, 0.5)
+    return c.maps(colour, 0.4 + 0.12 * (0.62 - sheet.tone), 0.00005 * sheet.tone, 0.5)
 
 
 def _stained(wood: Wood, darkness: float) -> tuple[Rgb, Rgb]:

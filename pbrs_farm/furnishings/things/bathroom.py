@@ -66,13 +66,12 @@ def toilet(m: Maker, size: Size) -> None:
     lid = (CERAMIC if m.chance(0.8) else m.pick(m.timber, glossy("lid", (0.1, 0.1, 0.1), 0.3),
         glossy("lid", m.any_colour(), 0.3)))
     with m.of(lid):
+        m.hoop(oval(bw - 0.06, bd - 0.09, z=zc + 0.005, power=power), rim + 0.012, 0.022)
         if is_open:
-            m.hoop(oval(bw - 0.06, bd - 0.09, z=zc + 0.005, power=power), rim + 0.012, 0.022)
             m.loft(rings(oval, [(bw - 0.01, bd - 0.06, 0.0), (bw, bd - 0.05, 0.004),
                 (bw, bd - 0.05, 0.014), (bw - 0.02, bd - 0.07, 0.018)], power=power),
                 turn=rotation_x(-1.65), at=(0.0, rim + bd / 2 - 0.01, back + tank + 0.065))
         else:
-            m.hoop(oval(bw - 0.06, bd - 0.09, z=zc + 0.005, power=power), rim + 0.012, 0.022)
             with m.hinged("lid", at=(0.0, rim + 0.032, zc + 0.025 - bd / 2), axis=(-1.0, 0.0, 0.0),
                 upper_rad=_LID_RAD):
                 m.loft(rings(oval, [(bw - 0.01, bd - 0.04, rim + 0.0315),

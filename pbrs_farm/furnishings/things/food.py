@@ -7,6 +7,7 @@ from itertools import product
 from numpy import cos, sin
 
 from pbrs_farm.core.frames import rotation_y
+from pbrs_farm.core.house import Material
 from pbrs_farm.dress.style import shade
 from pbrs_farm.dress.thing_materials import glass, plain
 from pbrs_farm.furnishings.things.maker import Maker, thing
@@ -91,11 +92,16 @@ def groceries(m: Maker) -> None:
             m.cylinder(0.03, 0, 0.004, n=14, of=crust)
 
 
+def skin(m: Maker) -> Material:
+    """Draw the skin of an apple, an orange or a lemon."""
+    colour = m.pick((0.72, 0.12, 0.1), (0.85, 0.45, 0.08), (0.88, 0.75, 0.15), (0.45, 0.62, 0.15))
+    return plain("fruit", shade(colour, m.uniform(0.85, 1.15)), 0.4)
+
+
 def apple(m: Maker, radius: float, x: float, y: float, z: float) -> None:
     """An apple or an orange about a point."""
-    colour = m.pick((0.72, 0.12, 0.1), (0.85, 0.45, 0.08), (0.88, 0.75, 0.15), (0.45, 0.62, 0.15))
-    skin = plain("fruit", shade(colour, m.uniform(0.85, 1.15)), 0.4)
-    m.sphere((x, y, z), radius * m.uniform(0.9, 1.05), n=10, name="fruit", of=skin)
+    of = skin(m)
+    m.sphere((x, y, z), radius * m.uniform(0.9, 1.05), n=10, name="fruit", of=of)
 
 
 @thing(group="fruit")
@@ -106,8 +112,5 @@ def fruit(m: Maker) -> None:
         radius = m.uniform(0.028, 0.04)
         x += radius
         z = m.uniform(-0.02, 0.02)
-        colour = m.pick((0.72, 0.12, 0.1), (0.85, 0.45, 0.08), (0.88, 0.75, 0.15),
-            (0.45, 0.62, 0.15))
-        skin = plain("fruit", shade(colour, m.uniform(0.85, 1.15)), 0.4)
-        m.sphere((x, radius, z), radius, n=12, name="fruit", of=skin)
+        m.sphere((x, radius, z), radius, n=12, name="fruit", of=skin(m))
         x += radius + 0.008

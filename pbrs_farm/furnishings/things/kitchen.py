@@ -708,8 +708,9 @@ def door_racks(m: Maker, x: Pair, y: Pair, z: float) -> None:
                 m.box(0.004, 0.064, 0.072, left=a, on=level + 0.006, against=z - 0.066)
 
 
-def holed_plate(x: Pair, y: Pair, z: Pair, middle: Pair, r: float, *, n: int = 36) -> Surface:
+def holed_plate(x: Pair, y: Pair, z: Pair, middle: Pair, r: float) -> Surface:
     """A plate in x and y, from z[0] to its front z[1], with a round hole of radius r about a point."""
+    n = 36  # corners of the hole
     t = 2 * np.pi * (np.arange(n) + 0.5) / n
     way = np.stack([np.cos(t), np.sin(t)], -1)
     centre = np.array(middle)

@@ -253,8 +253,7 @@ def chaise_sofa(m: Maker, size: Size) -> None:
             m.bulged(((w - 2 * aw) / 3 - 0.01, 0.18, h - seat + 0.02), n=7, edge=0.45, bulge=3.4,
                 turn=rotation_x(pi / 2 - 0.16), at=(x * (w - 2 * aw) / 3,
                 seat + (h - seat) / 2 - 0.01, -hd + back + 0.075))
-        for x in (-1.0, 1.0):
-            m.rounded(on_side(x, hw - aw, hw), (low, ah), (-hd + 0.005, z1 - 0.02), 0.04)
+        m.rounded((-hw, aw - hw), (low, ah), (-hd + 0.005, z1 - 0.02), 0.04, mirrored="x")
 
 
 @catalogued()
@@ -279,9 +278,8 @@ def armchair(m: Maker, size: Size) -> None:
                 m.bulged((w - 2 * aw - 0.01, 0.16, h - seat + 0.03), n=7, edge=0.45, bulge=3.2,
                     turn=rotation_x(pi / 2 - 0.18), at=(0.0, seat + (h - seat) / 2 - 0.015,
                     -hd + 0.21))
-                for s in (-1.0, 1.0):
-                    m.rounded(on_side(s, hw - aw, hw), (low, ah), (-hd + 0.01, hd - 0.015),
-                        min(0.05, 0.4 * aw))
+                m.rounded((-hw, aw - hw), (low, ah), (-hd + 0.01, hd - 0.015), min(0.05, 0.4 * aw),
+                    mirrored="x")
         case 1:  # with wings
             seat_legs(m, m.pick("tapered", "turned"), w, d - 0.04, low, feet_stuff)
             with m.of(material):
@@ -303,7 +301,7 @@ def armchair(m: Maker, size: Size) -> None:
                 m.loft(rings(oval, [(w * 0.86, d * 0.86, low), (w * 0.96, d * 0.96, low + 0.05),
                     (w * 0.97, d * 0.97, seat - 0.1)], n=26, power=2.6))
                 m.rounded(w - 0.24, (seat - 0.11, seat), (-hd + 0.14, hd - 0.005), 0.06)
-                tub_back(m, w, d, seat - 0.12, ah, h, 0.11)
+                m.add(tub(w, d, seat - 0.12, ah, h, 0.11))
         case 3:  # bent wood with loose cushions
             frame = m.pick(m.timber, m.timber, m.dark_timber, BLACK_STEEL)
             with m.of(frame):
@@ -334,15 +332,7 @@ def armchair(m: Maker, size: Size) -> None:
             with m.of(material):
                 m.loft(rings(oval, [(w * 0.5, d * 0.5, 0.29), (w * 0.8, d * 0.8, 0.33),
                     (w * 0.86, d * 0.86, seat - 0.03), (w * 0.8, d * 0.8, seat)], n=26))
-                tub_back(m, w, d, seat - 0.1, seat + 0.12, h, 0.08)
-
-
-def tub_back(m: Maker, w: float, d: float, y: float, low: float, high: float, t: float) -> None:
-    """A wall of cloth round the back of an oval w by d.
-
-    From y up to low at its ends and high in the middle.
-    """
-    m.add(tub(w, d, y, low, high, t))
+                m.add(tub(w, d, seat - 0.1, seat + 0.12, h, 0.08))
 
 
 @dataclass(frozen=True, slots=True)
