@@ -238,7 +238,10 @@ def _source_of(kind: str, location: str, files: SourceFiles, models: str, part: 
     # The id depends on the file alone, so companions never rename a house; a part is its own house.
     stem = f"{file.path.stem}-{part}" if part else file.path.stem
     house_id = keys.house_id(stem, keys.digest(sha, part) if part else sha)
-    companions = entry.companions(file, files)
+    try:
+        companions = entry.companions(file, files)
+    except (BadHouse, OSError):
+        companions = ""  # the reader reports the fault
     if kind == "reader":
         (mark,) = marks_in_digest("readers", [location.partition(":")[0]])
         companions = keys.sha256("\n".join(filter(None, (mark, companions))).encode())

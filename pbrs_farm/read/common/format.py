@@ -36,6 +36,15 @@ def root_of(given: GivenFile) -> tuple[RootFolder, str]:
     return RootFolder(root), name
 
 
+def data_of(given: GivenFile, max_bytes: int) -> tuple[RootFolder, bytes]:
+    """The folder of the file, which knows what was read in it, and the file's bytes; BadHouse without it."""
+    folder = RootFolder(given.path.parent)
+    data = folder.read(given.path.name, max_bytes=max_bytes)
+    if data is None:
+        raise BadHouse(given.path, "", "no such file")
+    return folder, data
+
+
 def deferred(place: str) -> Callable[..., Any]:
     """A function that imports `module:function` when it is called, and calls it."""
     module, _colon, name = place.partition(":")
@@ -61,7 +70,7 @@ class Format(DataFormat):
     read: Callable[[GivenFile, ReadFields], House]
     """The house, placed in the world: metres, y up. Raises BadHouse naming file and place."""
     companions: Callable[[GivenFile, SourceFiles], str] = no_companions
-    """Digest of all other files that the reader opens, "" if there are none. Never raises."""
+    """Digest of all other files that the reader opens, "" if there are none, or if it raises BadHouse."""
     main_file: str = ""  # that makes a folder a home; its id is then the folder's name
     has_parts: bool = False  # FILE#part names a part of the file
     has_box_only_items: bool = False  # may have items with only class and box, without a mesh

@@ -33,7 +33,7 @@ from pbrs_farm.geometry.plan_surfaces import horizontal
 from pbrs_farm.home.given_rooms import NO_ROOM, given_room
 from pbrs_farm.home.names import parted
 from pbrs_farm.home.room_use import named_kind
-from pbrs_farm.read.common.format import GivenFile
+from pbrs_farm.read.common.format import GivenFile, data_of
 from pbrs_farm.read.common.given_classes import LEFT_OUT, class_by_words, given_class
 from pbrs_farm.read.common.house_builder import CLASS_OF_STRUCTURE, HouseBuilder, structure_item
 from pbrs_farm.read.common.json_values import MAX_JSON_BYTES, NAME
@@ -75,11 +75,8 @@ _LIGHT_BAND_LM: Final = 800.0
 def companions_of_front3d(given: GivenFile, files: SourceFiles) -> str:
     """Digest of the models and textures that the reader may open; "" if there are none."""
     path, models = given.path, given.models
-    try:
-        data = RootFolder(path.parent).read(path.name, max_bytes=MAX_JSON_BYTES) or b""
-        house = front_file(data, path.name, Notes(path.name, strict=False))
-    except BadHouse:
-        return ""  # the reader reports the fault
+    _, data = data_of(given, MAX_JSON_BYTES)
+    house = front_file(data, path.name, Notes(path.name, strict=False))
     digests = []
     folder = model_folder(path, models)
     if folder is not None:
@@ -96,10 +93,7 @@ def companions_of_front3d(given: GivenFile, files: SourceFiles) -> str:
 def read_front3d(given: GivenFile, fields: ReadFields) -> House:
     """Read the house; BadHouse, naming the invalid entry. models: 3D-FUTURE's folder, "" = beside or above."""
     path, models = given.path, given.models
-    folder = RootFolder(path.parent)
-    data = folder.read(path.name, max_bytes=MAX_JSON_BYTES)
-    if data is None:
-        raise BadHouse(path, "", "no such file")
+    folder, data = data_of(given, MAX_JSON_BYTES)
     notes = Notes(path.name, strict=fields.strict)
     house = front_file(data, path.name, notes)
     check_number(sum(m.kind == "Floor" for m in house.meshes), path.name)

@@ -11,6 +11,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
+from posixpath import dirname
 from typing import Any
 
 import numpy as np
@@ -21,7 +22,7 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House, Item, ItemKind, Source
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import Gltf, entry
-from pbrs_farm.read.common.format import GivenFile
+from pbrs_farm.read.common.format import GivenFile, data_of
 from pbrs_farm.read.common.house_builder import HouseBuilder
 from pbrs_farm.read.common.name_classes import UNMAPPED
 from pbrs_farm.read.common.notes import Notes
@@ -45,6 +46,12 @@ class Beside:
     mapping: bytes | None = None  # JSON, None = no file
     rooms: bytes | None = None  # JSON, None = no file
 
+    @classmethod
+    def of(cls, folder: RootFolder, name: str, fetch: Fetch) -> Beside:
+        """The mapping and room files beside the file of that name below the folder."""
+        sides = (folder.name_from(dirname(name), side) for side in side_files(Path(name)))
+        return cls(fetch, *(folder.read(side, max_bytes=MAX_SCENE_BYTES) for side in sides))
+
 
 def read_given_gltf(given: GivenFile, fields: ReadFields) -> House:
     """The House of the file, with the mapping and room files beside it; as read_gltf_file."""
@@ -60,16 +67,8 @@ def companions_of_gltf(given: GivenFile, files: SourceFiles) -> str:
 
 def read_gltf_file(path: Path, fields: ReadFields) -> House:
     """The House of a .glb or .gltf with its mapping and room files; BadHouse names file and place."""
-    folder = RootFolder(path.parent)
-    data = folder.read(path.name, max_bytes=MAX_SCENE_BYTES)
-    if data is None:
-        raise BadHouse(path, "", "no such file")
-    mapping, rooms = side_files(path)
-    beside = Beside(
-        fetch=lambda name: folder.read(name, max_bytes=MAX_SCENE_BYTES),
-        mapping=folder.read(mapping, max_bytes=MAX_SCENE_BYTES),
-        rooms=folder.read(rooms, max_bytes=MAX_SCENE_BYTES),
-    )
+    folder, data = data_of(GivenFile(path), MAX_SCENE_BYTES)
+    beside = Beside.of(folder, path.name, lambda name: folder.read(name, max_bytes=MAX_SCENE_BYTES))
     house = read_gltf(data, path.name, fields=fields, beside=beside)
     if len(folder.names_read) > 1:
         return replace(house, source=replace(house.source, sha256=folder.sha256))
@@ -86,38 +85,27 @@ def read_gltf(data: bytes, name: str, *, fields: ReadFields, beside: Beside | No
     beside = beside or Beside()
     stem = name.rsplit(".", 1)[0]
     notes = Notes(name, strict=fields.strict)
+    gltf = gltf_document(data, name, beside.fetch)
+    copyright_line = gltf.document["asset"].get("copyright", "")
+    source = Source("gltf", name, keys.sha256(data), attribution=str(copyright_line)[:500])
+    return house_of_gltf(gltf, source, stem, fields, notes, beside)
+
+
+def house_of_gltf(
+    gltf: Gltf, source: Source, stem: str, fields: ReadFields, notes: Notes, beside: Beside
+) -> House:
+    """The House of a document. stem: of its file. BadHouse as read_gltf."""
     mapping = Mapping()
     if beside.mapping is not None:
         mapping = mapping_from_json(beside.mapping, f"{stem}.classes.json")
     # Read the scene's content, then cut its floors into rooms.
-    gltf = gltf_document(data, name, beside.fetch)
-    copyright_line = gltf.document["asset"].get("copyright", "")
-    source = Source("gltf", name, keys.sha256(data), attribution=str(copyright_line)[:500])
-    return house_of_gltf(
-        gltf, source, stem, fields, notes, mapping=mapping, fetch=beside.fetch, rooms=beside.rooms
-    )
-
-
-def house_of_gltf(
-    gltf: Gltf,
-    source: Source,
-    stem: str,
-    fields: ReadFields,
-    notes: Notes,
-    *,
-    mapping: Mapping,
-    fetch: Fetch,
-    rooms: bytes | None = None,
-) -> House:
-    """The House of a document. stem: of its file; rooms: bytes of its room file. BadHouse as read_gltf."""
-    name, room_file = source.file, rooms
-    materials = SceneMaterials(gltf, fetch, notes)
+    materials = SceneMaterials(gltf, beside.fetch, notes)
     items = list(items_of_scene(gltf, mapping, materials, notes, fields))
     note_unread(gltf, notes)
-    if room_file is not None:
-        house_rooms = rooms_from_json(room_file, f"{stem}.rooms.json", items)
+    if beside.rooms is not None:
+        house_rooms = rooms_from_json(beside.rooms, f"{stem}.rooms.json", items)
     elif scene_rooms := _rooms_of_scene(gltf):
-        house_rooms = rooms_from_value({"rooms": scene_rooms}, name, items)
+        house_rooms = rooms_from_value({"rooms": scene_rooms}, source.file, items)
     else:
         house_rooms = rooms_from_floors(items)
     if not house_rooms:
@@ -125,9 +113,9 @@ def house_of_gltf(
         hint = (
             f"{_of_its_size(items, source.kind)}{hint}; `pbrs-farm objects` renders single models"
         )
-        raise BadHouse(name, "scene", _why_no_floor(items), hint=hint)
+        raise BadHouse(source.file, "scene", _why_no_floor(items), hint=hint)
     # Sort rooms into levels and items into rooms.
-    builder = HouseBuilder(name, fields, notes, materials.library)
+    builder = HouseBuilder(source.file, fields, notes, materials.library)
     builder.set_rooms(house_rooms)
     for item in items:
         extent = _extent(item)

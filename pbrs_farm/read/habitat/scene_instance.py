@@ -27,8 +27,7 @@ from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.gltf.assembly import Assembly, files_of_asset
 from pbrs_farm.read.gltf.document import meshes_of, numbers, object_at, placed_nodes
-from pbrs_farm.read.gltf.node_classes import Mapping
-from pbrs_farm.read.gltf.scene import house_of_gltf
+from pbrs_farm.read.gltf.scene import Beside, house_of_gltf
 from pbrs_farm.read.robot.links import files_of_robot, model_name, placed_links, roots_of_robot
 from pbrs_farm.read.robot.urdf import MAX_BYTES, Robot, Visual, robot_from_urdf
 from pbrs_farm.regular_files import text_from_bytes
@@ -99,9 +98,7 @@ def read_habitat(given: GivenFile, fields: ReadFields) -> House:
     source = Source("habitat", path.name, keys.sha256(data))
     stem = path.name.split(".")[0]
     rooms = _rooms_of_regions(dataset, scene.get("semantic_scene_instance"), stem)
-    return house_of_gltf(
-        gltf, source, stem, fields, notes, mapping=Mapping(), fetch=built.fetch, rooms=rooms
-    )
+    return house_of_gltf(gltf, source, stem, fields, notes, Beside(built.fetch, rooms=rooms))
 
 
 def companions_of_habitat(given: GivenFile, files: SourceFiles) -> str:
@@ -130,8 +127,8 @@ def companions_of_habitat(given: GivenFile, files: SourceFiles) -> str:
                 names |= {a[1] for a in [dataset.template(template, "ao")] if a}
         for pattern in ("*.semantic_config.json", "*objects.csv", "*.lighting_config.json"):
             names |= set(dataset.named(pattern))
-    except (BadHouse, OSError, AttributeError, TypeError):
-        return ""
+    except (AttributeError, TypeError):
+        return ""  # the reader reports the fault
     return files.digest(dataset.folder, names)
 
 

@@ -26,8 +26,8 @@ from pbrs_farm.read.common.format import GivenFile, root_of
 from pbrs_farm.read.common.name_classes import class_of_node_name
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.gltf.document import UNREAD
-from pbrs_farm.read.gltf.node_classes import Mapping, collection_of, mapping_from_json
-from pbrs_farm.read.gltf.scene import house_of_gltf, side_files
+from pbrs_farm.read.gltf.node_classes import collection_of
+from pbrs_farm.read.gltf.scene import Beside, house_of_gltf
 from pbrs_farm.read.gltf.scene_writer import KEY, SceneWriter, joint_row, matrix_row
 from pbrs_farm.read.mjcf.geoms import UNREAD as UNREAD_SHAPES
 from pbrs_farm.read.mjcf.geoms import (
@@ -50,7 +50,6 @@ _KINDS: Final = {
 
 _FLAT_M: Final = 0.02  # maximum height of a room's floor geom, metres
 _LEAST_ROOM_M: Final = 2.0  # minimum size of a room; a smaller body with a room's name is an item, such as a kitchen unit
-_MOST_JSON_BYTES: Final = 16 * 2**20
 
 
 def read_mjcf(given: GivenFile, fields: ReadFields) -> House:
@@ -66,18 +65,9 @@ def read_mjcf(given: GivenFile, fields: ReadFields) -> House:
     model, data, collides = _compiled(given)
     scene = _Scene(model, data, collides, path.name, notes, fields)
     gltf = scene.gltf()
-    parent = name.rpartition("/")[0]
-    mapping, rooms = (folder.name_from(parent, beside) for beside in side_files(path))
-    mapping_data = folder.read(mapping, max_bytes=_MOST_JSON_BYTES)
+    beside = Beside.of(folder, name, lambda number: png_of_texture(model, int(number)))
     return house_of_gltf(
-        gltf,
-        Source("mjcf", path.name, folder.sha256),
-        path.stem,
-        fields,
-        notes,
-        mapping=Mapping() if mapping_data is None else mapping_from_json(mapping_data, mapping),
-        fetch=lambda number: png_of_texture(model, int(number)),
-        rooms=folder.read(rooms, max_bytes=_MOST_JSON_BYTES),
+        gltf, Source("mjcf", path.name, folder.sha256), path.stem, fields, notes, beside
     )
 
 

@@ -54,15 +54,10 @@ def files_of_model(folder: RootFolder, name: str) -> set[str]:
 
 def companions_of_mjcf(given: GivenFile, files: SourceFiles) -> str:
     """Digest of all other files of the model; "" if there are none."""
-    try:
-        folder, name = root_of(given)
-        names = files_of_model(folder, name) - {name}
-        beside = [
-            f"{name.rsplit('.', 1)[0]}{suffix}" for suffix in (".classes.json", ".rooms.json")
-        ]
-    except (BadHouse, OSError):
-        return ""
-    return files.digest(folder, {*names, *beside})
+    folder, name = root_of(given)
+    stem = name.rsplit(".", 1)[0]
+    beside = {f"{stem}.classes.json", f"{stem}.rooms.json"}
+    return files.digest(folder, (files_of_model(folder, name) | beside) - {name})
 
 
 def _below(folder: RootFolder, at: str, file: str, own: str) -> str:

@@ -17,13 +17,12 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import House, ItemKind, Source
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.read.common.format import GivenFile
+from pbrs_farm.read.common.format import GivenFile, data_of
 from pbrs_farm.read.common.name_classes import class_of_node_name
 from pbrs_farm.read.common.notes import Notes
-from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
-from pbrs_farm.read.gltf.node_classes import Mapping
+from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.gltf.obj_document import files_of_obj, gltf_of_groups, materials_of_obj
-from pbrs_farm.read.gltf.scene import house_of_gltf
+from pbrs_farm.read.gltf.scene import Beside, house_of_gltf
 from pbrs_farm.read.mesh.obj import Mesh, parse_obj
 from pbrs_farm.regular_files import MAX_SCENE_BYTES
 
@@ -38,10 +37,8 @@ _FILLERS: Final = re.compile(r"\b(mesh|group|model|component|default|obj|object)
 def read_obj_home(given: GivenFile, fields: ReadFields) -> House:
     """The House of the file. Raises BadHouse naming the place, and for a model without named groups."""
     path = given.path
-    folder, notes = RootFolder(path.parent), Notes(path.name, strict=fields.strict)
-    data = folder.read(path.name, max_bytes=MAX_SCENE_BYTES)
-    if data is None:
-        raise BadHouse(path, "", "no such file")
+    folder, data = data_of(given, MAX_SCENE_BYTES)
+    notes = Notes(path.name, strict=fields.strict)
     model = parse_obj(data, path.name, max_triangles=fields.max_triangles)
     groups: dict[str, list[Mesh]] = {}
     for mesh in model.meshes:
@@ -68,21 +65,14 @@ def read_obj_home(given: GivenFile, fields: ReadFields) -> House:
         path.stem,
         fields,
         notes,
-        mapping=Mapping(),
-        fetch=lambda name: folder.read(name, max_bytes=MAX_SCENE_BYTES),
+        Beside(lambda name: folder.read(name, max_bytes=MAX_SCENE_BYTES)),
     )
 
 
 def companions_of_obj_home(given: GivenFile, files: SourceFiles) -> str:
     """Digest of the material libraries and their pictures; "" if there are none."""
-    path = given.path
-    folder = RootFolder(path.parent)
-    try:
-        data = folder.read(path.name, max_bytes=MAX_SCENE_BYTES) or b""
-        names = files_of_obj(data, folder, path.name, files)
-    except (BadHouse, OSError):
-        return ""
-    return files.digest(folder, names)
+    folder, data = data_of(given, MAX_SCENE_BYTES)
+    return files.digest(folder, files_of_obj(data, folder, given.path.name, files))
 
 
 def _kind_of_group(name: str) -> ItemKind | None:

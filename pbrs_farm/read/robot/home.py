@@ -19,8 +19,7 @@ from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.gltf.assembly import Assembly, files_of_asset
 from pbrs_farm.read.gltf.document import UNREAD, placed_nodes
-from pbrs_farm.read.gltf.node_classes import Mapping, mapping_from_json
-from pbrs_farm.read.gltf.scene import house_of_gltf, side_files
+from pbrs_farm.read.gltf.scene import Beside, house_of_gltf, side_files
 from pbrs_farm.read.robot.links import (
     PLANE,
     RootsOf,
@@ -34,7 +33,6 @@ from pbrs_farm.read.robot.urdf import GREY, MAX_BYTES, Link, Robot, Solid, Visua
 
 _MODELS: Final = (".glb", ".gltf", ".obj", ".stl")
 _GROUND_M: Final = 0.1  # thickness of the floor made of a plane
-_MOST_JSON_BYTES: Final = 16 * 2**20
 
 
 def read_robot(given: GivenFile, fields: ReadFields) -> House:
@@ -53,33 +51,22 @@ def read_robot(given: GivenFile, fields: ReadFields) -> House:
         raise BadHouse(name, "", "none of its models is here", hint=hint)
     scene.add_ground()
     scene.note_losses()
-    parent, mapping = posixpath.dirname(name), Mapping()
-    beside = [folder.name_from(parent, other) for other in side_files(given.path)]
-    classes, rooms = (folder.read(other, max_bytes=_MOST_JSON_BYTES) for other in beside)
-    if classes is not None:
-        mapping = mapping_from_json(classes, beside[0])
+    beside = Beside.of(folder, name, scene.built.fetch)
     source = Source("robot", given.path.name, folder.sha256)
-    return house_of_gltf(
-        scene.built.gltf(), source, given.path.stem, fields, notes,
-        mapping=mapping, fetch=scene.built.fetch, rooms=rooms,
-    )  # fmt: skip
+    return house_of_gltf(scene.built.gltf(), source, given.path.stem, fields, notes, beside)
 
 
 def companions_of_robot(given: GivenFile, files: SourceFiles) -> str:
     """Digest of all other files that the reader opens; "" if there are none."""
-    try:
-        folder, name = root_of(given)
-        parent = posixpath.dirname(name)
-        names = {folder.name_from(parent, other) for other in side_files(given.path)}
-        for model in _models(folder, name, Notes(name, strict=False)):
-            visuals = {v.file for link in model.robot.links for v in link.visuals if v.file}
-            for model_file in {model_name(v, folder, model.folder) for v in visuals}:
-                if model_file.lower().endswith(_MODELS) and folder.path(model_file) is not None:
-                    names |= files_of_asset(folder, model_file, files)
-        names |= set(folder.names_read) - {name}
-    except (BadHouse, OSError):
-        return ""
-    return files.digest(folder, names)
+    folder, name = root_of(given)
+    parent = posixpath.dirname(name)
+    names = {folder.name_from(parent, other) for other in side_files(given.path)}
+    for model in _models(folder, name, Notes(name, strict=False)):
+        visuals = {v.file for link in model.robot.links for v in link.visuals if v.file}
+        for model_file in {model_name(v, folder, model.folder) for v in visuals}:
+            if model_file.lower().endswith(_MODELS) and folder.path(model_file) is not None:
+                names |= files_of_asset(folder, model_file, files)
+    return files.digest(folder, names | set(folder.names_read) - {name})
 
 
 def _models(folder: RootFolder, name: str, notes: Notes) -> list[SdfModel]:

@@ -27,14 +27,14 @@ from pbrs_farm.read.common.arch_elements import (
     wall_surfaces,
 )
 from pbrs_farm.read.common.doors_and_windows import Hole, merge_holes
-from pbrs_farm.read.common.format import GivenFile
+from pbrs_farm.read.common.format import GivenFile, data_of
 from pbrs_farm.read.common.house_builder import HouseBuilder, structure_item
 from pbrs_farm.read.common.json_values import MAX_JSON_BYTES
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.openings import LEAST_HOLE_M
 from pbrs_farm.read.common.room_floors import ceiling_height, floor_height, floor_polygon
 from pbrs_farm.read.common.rooms import check_number, check_unit, room_at
-from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
+from pbrs_farm.read.common.source_files import SourceFiles
 from pbrs_farm.read.scenestate.scene_document import (
     ArchMaterials,
     SceneDocument,
@@ -60,12 +60,9 @@ _AREA_M2: Final = 0.05  # least area of a floor
 def companions_of_scenestate(given: GivenFile, files: SourceFiles) -> str:
     """Digest of the models and tables that the reader may open; "" if there are none."""
     path, models = given.path, given.models
-    notes = Notes(path.name, strict=False)
-    try:
-        data = RootFolder(path.parent).read(path.name, max_bytes=MAX_JSON_BYTES) or b""
-        ids = {o.model for o in scene_document(data, path.name, notes).objects}
-    except BadHouse:
-        return ""  # the reader reports the fault
+    _, data = data_of(given, MAX_JSON_BYTES)
+    document = scene_document(data, path.name, Notes(path.name, strict=False))
+    ids = {o.model for o in document.objects}
     names = [*table_names(), *(n for model in sorted(ids) for n in names_of_model(model))]
     digests = [files.digest(root, names) for root in roots_of(path, models)]
     return keys.digest(*digests) if any(digests) else ""
@@ -74,10 +71,7 @@ def companions_of_scenestate(given: GivenFile, files: SourceFiles) -> str:
 def read_scenestate(given: GivenFile, fields: ReadFields) -> House:
     """Read the house. Raises BadHouse, naming the invalid element, and for a file without walls and floors."""
     path, models = given.path, given.models
-    folder = RootFolder(path.parent)
-    data = folder.read(path.name, max_bytes=MAX_JSON_BYTES)
-    if data is None:
-        raise BadHouse(path, "", "no such file")
+    folder, data = data_of(given, MAX_JSON_BYTES)
     notes = Notes(path.name, strict=fields.strict)
     document = scene_document(data, path.name, notes)
     _check_number(document, path.name)

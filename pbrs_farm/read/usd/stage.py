@@ -21,8 +21,7 @@ from pbrs_farm.installation import is_installed, need
 from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.source_files import SourceFiles
-from pbrs_farm.read.gltf.node_classes import Mapping, mapping_from_json
-from pbrs_farm.read.gltf.scene import house_of_gltf, side_files
+from pbrs_farm.read.gltf.scene import Beside, house_of_gltf, side_files
 from pbrs_farm.regular_files import text_from_bytes
 
 if TYPE_CHECKING:
@@ -70,8 +69,10 @@ def read_usd(given: GivenFile, fields: ReadFields) -> House:
         path.stem,
         fields,
         notes,
-        mapping=_mapping(folder, path),
-        fetch=lambda number: shaders.picture(int(number), folder.picture),
+        Beside(
+            lambda number: shaders.picture(int(number), folder.picture),
+            mapping=_read_beside(folder, path, side_files(path)[0]),
+        ),
     )
     if rooms:
         return house
@@ -122,10 +123,8 @@ def _name_beside_stage(folder: StageFolder, path: Path, name: str) -> str:
     return str(Path(own_name).with_name(name))
 
 
-def _mapping(folder: StageFolder, path: Path) -> Mapping:
-    name = side_files(path)[0]
-    data = folder.root.read(_name_beside_stage(folder, path, name), max_bytes=_MOST_JSON_BYTES)
-    return Mapping() if data is None else mapping_from_json(data, name)
+def _read_beside(folder: StageFolder, path: Path, name: str) -> bytes | None:
+    return folder.root.read(_name_beside_stage(folder, path, name), max_bytes=_MOST_JSON_BYTES)
 
 
 def _given_rooms(
@@ -138,17 +137,13 @@ def _given_rooms(
         value = json_from_bytes(str(text).encode(), path.name)
         return value if isinstance(value, list) else []
     name = side_files(path)[1]
-    data = folder.root.read(_name_beside_stage(folder, path, name), max_bytes=_MOST_JSON_BYTES)
-    if data is not None:
+    if (data := _read_beside(folder, path, name)) is not None:
         value = json_from_bytes(data, name)
         rooms = value.get("rooms") if isinstance(value, dict) else None
         if not isinstance(rooms, list):
             raise BadHouse(name, "rooms", 'expected {"rooms": [{"polygon": [[x, z], ...]}]}')
         return rooms
-    data = folder.root.read(
-        _name_beside_stage(folder, path, "rooms.json"), max_bytes=_MOST_JSON_BYTES
-    )
-    if data is None:
+    if (data := _read_beside(folder, path, "rooms.json")) is None:
         return []
     value = json_from_bytes(data, "rooms.json")
     rows = value.get("rooms") if isinstance(value, dict) else value
