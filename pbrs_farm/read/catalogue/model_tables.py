@@ -20,7 +20,7 @@ from typing import Any, Final
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse, BadInput
 from pbrs_farm.read.catalogue.library_files import LibraryNotes
-from pbrs_farm.read.common.given_classes import given_class
+from pbrs_farm.read.common.given_classes import given_class, hssd_rows
 from pbrs_farm.read.common.json_values import bounded_json
 from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular, text_from_bytes
 
@@ -181,15 +181,11 @@ def _future(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
 
 def _hssd(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
     """HSSD: an id a row and its category; models in objects/, by the id's first character."""
-    rows = csv.reader(io.StringIO(text_from_bytes(_data(path / name), "replace")))
-    head = [h.strip().lower() for h in next(rows, [])]
-    at_id = head.index("id") if "id" in head else 0
-    at_class = next((head.index(h) for h in ("main_category", "category") if h in head), 14)
     models = {}
-    for row in rows:
-        if len(row) <= max(at_id, at_class) or not _is_plain(row[at_id].strip()):
+    for uid, category, _size in hssd_rows(_data(path / name)):
+        if not _is_plain(uid):
             continue
-        uid, words = row[at_id].strip(), row[at_class].strip().replace("_", " ")
+        words = category.replace("_", " ")
         ways = (f"objects/{uid[0]}/{uid}.glb", f"objects/{uid}.glb", f"{uid}.glb")
         file = next((w for w in ways if (path / w).is_file()), ways[0])
         quarters = _front_of_config(path / file.replace(".glb", ".object_config.json"))

@@ -6,35 +6,22 @@ the packages that belong to another group, face another way, or are left out, ea
 
 from __future__ import annotations
 
-import csv
 import re
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from typing import Final
 
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.house import ItemKind
-from pbrs_farm.read.common.furniture_classes import class_of_piece, plain
+from pbrs_farm.read.common.furniture_classes import class_of_piece, plain, rows_of_table
 
 Size = tuple[float, float, float]  # width, depth, height in metres
 
 _ASIDE: Final = frozenset(["with", "and", "on", "of", "for", "from", "under", "without", "in"])
-_OUTSIDE: Final = frozenset(
-    [
-        "exterior",
-        "characters",
-        "character",
-        "vehicles",
-        "vehicle",
-        "staircases",
-        "people",
-        "road",
-        "garden",
-    ]
-)
+_OUTDOORS: Final = "exterior characters character vehicles vehicle staircases people road garden"
+_OUTSIDE: Final = frozenset(_OUTDOORS.split())
 """Categories that are never inside a room."""
 _LONGEST_PHRASE: Final = 5  # words
 _LAMP: Final = "lamp"
@@ -118,7 +105,7 @@ def group_rules() -> tuple[GroupRule, ...]:
             _range(r["height_cm"]),
             tuple(r["words"].split("|")),
         )
-        for r in _rows_of_table("groups.csv")
+        for r in rows_of_table("groups.csv", "catalogue")
     )
 
 
@@ -127,13 +114,8 @@ def piece_verdicts() -> Mapping[str, PieceVerdict]:
     """Rows of exceptions.csv by piece id (`<library>#<id>`)."""
     return {
         r["id"]: PieceVerdict(r["group"], float(r["turn_deg"] or 0), r["reason"])
-        for r in _rows_of_table("exceptions.csv")
+        for r in rows_of_table("exceptions.csv", "catalogue")
     }
-
-
-def _rows_of_table(name: str) -> list[dict[str, str]]:
-    text = files("pbrs_farm.read.catalogue").joinpath(name).read_text("utf-8")
-    return list(csv.DictReader(text.splitlines()))
 
 
 def _range(text: str) -> tuple[float, float]:

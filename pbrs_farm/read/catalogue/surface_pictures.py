@@ -6,7 +6,6 @@ Effects: reads the libraries.
 
 from __future__ import annotations
 
-import csv
 import hashlib
 import io
 import posixpath
@@ -14,7 +13,6 @@ from collections import Counter
 from collections.abc import Iterator
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
@@ -32,7 +30,7 @@ from pbrs_farm.read.catalogue.library_files import (
     opened_library,
 )
 from pbrs_farm.read.catalogue.library_shapes import small_texture
-from pbrs_farm.read.common.furniture_classes import plain
+from pbrs_farm.read.common.furniture_classes import plain, rows_of_table
 from pbrs_farm.read.common.material_library import texture_from_bytes
 from pbrs_farm.read.common.source_files import Resources
 from pbrs_farm.regular_files import read_regular
@@ -175,10 +173,8 @@ def _turn_texture(texture: Texture) -> Texture:
 
 @cache
 def _seen_pictures() -> dict[str, list[_Seen]]:
-    folder = files("pbrs_farm.read.catalogue")
-    text = folder.joinpath("surface-pictures.csv").read_text("utf-8")
     rows_of_library: dict[str, list[_Seen]] = {}
-    for r in csv.DictReader(text.splitlines()):
+    for r in rows_of_table("surface-pictures.csv", "catalogue"):
         size = (float(r["width_cm"]) / 100, float(r["height_cm"]) / 100)
         row = _Seen(r["image"], r["group"], r["turned"] == "1", size)
         rows_of_library.setdefault(r["library"], []).append(row)

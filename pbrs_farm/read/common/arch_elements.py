@@ -26,9 +26,8 @@ from pbrs_farm.read.common.json_values import (
     number_array,
 )
 from pbrs_farm.read.common.model_materials import ModelMaterials
-from pbrs_farm.read.common.placed_mesh import placed
+from pbrs_farm.read.common.placed_mesh import mesh_of_surface, placed
 from pbrs_farm.read.mesh.mtl import ObjMaterial
-from pbrs_farm.read.mesh.obj import Mesh
 
 # Default wall thickness.
 WALL_DEPTH_M: Final = 0.10
@@ -151,20 +150,12 @@ def _material(materials: ModelMaterials, e: Element, position: int) -> int:
     return materials.library.index(material)
 
 
-def _in_world(arch: Arch, surface: Surface) -> Surface | None:
-    mesh = Mesh(
-        "",
-        "",
-        surface.positions.astype(np.float64),
-        surface.faces,
-        None if surface.uvs is None else surface.uvs.astype(np.float64),
-        np.zeros((len(surface.positions), 3)),
-    )
-    return placed(mesh, arch.world_from_house, name=surface.name, material=surface.material)
-
-
 def _surfaces_with_area(arch: Arch, surfaces: Sequence[Surface]) -> tuple[Surface, ...]:
-    return tuple(s for s in (_in_world(arch, surface) for surface in surfaces) if s is not None)
+    in_world = (
+        placed(mesh_of_surface(s), arch.world_from_house, name=s.name, material=s.material)
+        for s in surfaces
+    )
+    return tuple(s for s in in_world if s is not None)
 
 
 def slab_surfaces(arch: Arch, e: Element, materials: ModelMaterials) -> tuple[Surface, ...]:

@@ -64,21 +64,10 @@ _FLATTEST_PLANT: Final = 0.1  # minimum height over shorter side; flatter plants
 _SLIMMEST_CROWN: Final = 0.25  # of the longer side
 _OFF_SCALE: Final = 2.0  # of the maximum size, for a file whose scale is a little off
 # Items sold with a mirror ("Sink_mirror"); other items are mirrored copies ("Chair_mirror").
-_OWNERS_OF_MIRRORS: Final = frozenset(
-    [
-        "bathtub",
-        "bed",
-        "cabinet",
-        "desk",
-        "dresser",
-        "otherfurniture",
-        "otherstructure",
-        "shelves",
-        "sink",
-        "table",
-        "toilet",
-    ]
+_OWNERS: Final = (
+    "bathtub bed cabinet desk dresser otherfurniture otherstructure shelves sink table toilet"
 )
+_OWNERS_OF_MIRRORS: Final = frozenset(_OWNERS.split())
 _THINNEST_COPY: Final = 0.2  # minimum thickness over the middle side of a mirrored copy
 _STANDING: Final = frozenset({"bathtub", "bed", "chair", "desk", "sofa", "table", "toilet"})
 
@@ -130,8 +119,9 @@ class PieceClass:
         return CLASS_TAG + self.rule
 
 
-def _rows_of_csv(name: str) -> list[dict[str, str]]:
-    text = files("pbrs_farm.read.common").joinpath(name).read_text("utf-8")
+def rows_of_table(name: str, folder: str = "common") -> list[dict[str, str]]:
+    """The rows of a CSV of a folder of pbrs_farm.read."""
+    text = files(f"pbrs_farm.read.{folder}").joinpath(name).read_text("utf-8")
     return list(csv.DictReader(text.splitlines()))
 
 
@@ -142,7 +132,7 @@ def _sizes() -> Mapping[str, tuple[float, float, float, float]]:
     Items outside this range are toys, trays, heaps or mistakes. A side of 0 is unbounded.
     """
     sizes: dict[str, tuple[float, float, float, float]] = {}
-    for row in _rows_of_csv("class_sizes.csv"):
+    for row in rows_of_table("class_sizes.csv"):
         label, *sides = row.values()
         least_side, most_side, least_height, most_height = map(float, sides)
         sizes[label] = (least_side, most_side, least_height, most_height)
@@ -153,7 +143,7 @@ def _sizes() -> Mapping[str, tuple[float, float, float, float]]:
 def _classes_of_catalogue_ids() -> Mapping[str, int]:
     return {
         r["catalogId"]: NYU40_NAMES.index(r["class"])
-        for r in _rows_of_csv("sweethome3d-classes.csv")
+        for r in rows_of_table("sweethome3d-classes.csv")
     }
 
 
@@ -163,7 +153,7 @@ def _vocabulary() -> Mapping[str, tuple[str, bool]]:
     # A phrase with "-" before it also ends compound words ("-tisch": Esstisch).
     return {
         plain(phrase): (r["class"], r["language"] in _HEAD_FIRST)
-        for r in _rows_of_csv("words.csv")
+        for r in rows_of_table("words.csv")
         for phrase in r["words"].split("|")
     }
 
@@ -171,7 +161,7 @@ def _vocabulary() -> Mapping[str, tuple[str, bool]]:
 @cache
 def _describing_words() -> Mapping[str, _Describing]:
     rules: dict[str, _Describing] = {}
-    for row in _rows_of_csv("describing_words.csv"):
+    for row in rows_of_table("describing_words.csv"):
         after, but_not = (frozenset(row[key].split("|")) for key in ("after", "but not"))
         # One value a row: words of a row do not describe each other.
         rule = _Describing(after, but_not, row["is"] == "material")

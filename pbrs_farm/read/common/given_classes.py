@@ -8,9 +8,10 @@ without a mesh.
 from __future__ import annotations
 
 import csv
+import io
 import math
+from collections.abc import Iterator
 from functools import cache
-from importlib.resources import files
 from typing import Final, NamedTuple
 
 import numpy as np
@@ -18,7 +19,8 @@ import numpy as np
 from pbrs_farm.core.classes import DOOR, NYU40_NAMES, WINDOW
 from pbrs_farm.core.house import BOX_ONLY, FRONT_GIVEN, Box, Item, ItemKind
 from pbrs_farm.home.names import parted, words_of
-from pbrs_farm.read.common.furniture_classes import class_of_piece, kind_of
+from pbrs_farm.read.common.furniture_classes import class_of_piece, kind_of, rows_of_table
+from pbrs_farm.regular_files import text_from_bytes
 
 LEFT_OUT: Final = "none"
 REVEAL: Final = "opening-reveal"
@@ -56,16 +58,28 @@ def class_by_words(*names: str) -> GivenClass | None:
     return None
 
 
+def hssd_rows(data: bytes) -> Iterator[tuple[str, str, str]]:
+    """(id, category, size as written) of HSSD's objects.csv: without a head the id is first, the category 15th."""
+    rows = csv.reader(io.StringIO(text_from_bytes(data, "replace")))
+    head = [h.strip().lower() for h in next(rows, [])]
+    at_id = head.index("id") if "id" in head else 0
+    at_category = next((head.index(h) for h in ("main_category", "category") if h in head), 14)
+    at_size = next((k for k, h in enumerate(head) if h.endswith("dims")), len(head))
+    for row in rows:
+        if len(row) > max(at_id, at_category):
+            size = row[at_size] if at_size < len(row) else ""
+            yield row[at_id].strip(), row[at_category].strip(), size
+
+
 def _key_of_name(name: str) -> str:
     return " ".join(name.lower().replace("_", " ").split())
 
 
 @cache
 def _classes_by_name() -> dict[tuple[str, str], GivenClass]:
-    text = files("pbrs_farm.read.common").joinpath("given_classes.csv").read_text("utf-8")
     return {
         (row["source"], _key_of_name(row["name"])): GivenClass(row["kind"], _nyu40(row["nyu40"]))
-        for row in csv.DictReader(text.splitlines())
+        for row in rows_of_table("given_classes.csv")
     }
 
 

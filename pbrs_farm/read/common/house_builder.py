@@ -58,6 +58,15 @@ def structure_item(
     )
 
 
+def unique_id(name: str, taken: set[str]) -> str:
+    """The name, with a number if it is taken; it is taken then."""
+    unique, k = name, 2
+    while unique in taken:
+        unique, k = f"{name}.{k}", k + 1
+    taken.add(unique)
+    return unique
+
+
 @dataclass(slots=True)
 class HouseBuilder:
     """Collects a house's rooms, items and openings; `house` checks the limits and completes it.

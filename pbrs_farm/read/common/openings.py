@@ -142,10 +142,7 @@ def _opening_of_void(void: Void, frames: Sequence[_WallFrame]) -> Opening | None
     ]
     holes = [h for points in wall_depths if (h := _hole(points, ends[0], ends[1])) is not None]
     return _opening(
-        void.id if void.item is None else f"{void.item.id}_hole",
-        void.level_id,
-        void.item,
-        is_window=void.is_window,
+        void,
         axes=axes,
         ends=_across_walls(ends, [*depth, *wall_depths]),
         has_holes=is_bare,
@@ -177,16 +174,7 @@ def _opening_in_roof(void: Void, items: Sequence[Item]) -> Opening | None:
     if len(rim) < 4 or np.ptp(rim[:, :2], axis=0).min() < LEAST_HOLE_M:
         return None
     ends = np.stack([rim.min(0), rim.max(0)])
-    return _opening(
-        void.id if void.item is None else f"{void.item.id}_hole",
-        void.level_id,
-        void.item,
-        is_window=void.is_window,
-        axes=axes,
-        ends=_across_walls(ends, [rim]),
-        has_holes=True,
-        is_cut=True,
-    )
+    return _opening(void, axes=axes, ends=_across_walls(ends, [rim]), has_holes=True, is_cut=True)
 
 
 def _longest_side(void: Void, normal: F64) -> F64:
@@ -299,11 +287,9 @@ def _opening_of_leaf(item: Item, leaf: Box, frames: Sequence[_WallFrame]) -> Ope
     ends = _across_walls(np.stack([low, high]), standing)
     if (ends[1] - ends[0])[:2].min() < LEAST_HOLE_M:
         return None
+    is_window = item.kind is ItemKind.WINDOW
     return _opening(
-        f"{item.id}_hole",
-        item.level_id,
-        item,
-        is_window=item.kind is ItemKind.WINDOW,
+        Void(item.id, item.level_id, frozenset(), leaf.corners, item, is_window),
         axes=axes,
         ends=ends,
         has_holes=bool(holes),
@@ -311,28 +297,18 @@ def _opening_of_leaf(item: Item, leaf: Box, frames: Sequence[_WallFrame]) -> Ope
     )
 
 
-def _opening(
-    id_: str,
-    level_id: str,
-    item: Item | None,
-    *,
-    is_window: bool,
-    axes: F64,
-    ends: F64,
-    has_holes: bool,
-    is_cut: bool,
-) -> Opening:
-    """The opening between two corners (2, 3) in axes along the wall, up and across it."""
+def _opening(void: Void, *, axes: F64, ends: F64, has_holes: bool, is_cut: bool) -> Opening:
+    """The opening of a void between two corners (2, 3) in axes along the wall, up and across it."""
     low, high = ends
     # Lay the quad in the middle; a plug overlaps its hole, a cutter reaches out of the wall.
     middle = (low[2] + high[2]) / 2
     quad = [[low[0], low[1]], [high[0], low[1]], [high[0], high[1]], [low[0], high[1]]]
     grown = np.array([_OVERLAP_M, _OVERLAP_M, 0.0] if has_holes else [0.0, 0.0, CUTTER_REACH_M])
     return Opening(
-        id=id_,
-        level_id=level_id,
-        item_id=item.id if item is not None else None,
-        is_window=is_window,
+        id=void.id if void.item is None else f"{void.item.id}_hole",
+        level_id=void.level_id,
+        item_id=None if void.item is None else void.item.id,
+        is_window=void.is_window,
         cutter=box_between(low - grown, high + grown, axes),
         quad=np.array([[s, y, middle] for s, y in quad]) @ axes.T,
         normal=axes[:, 2],

@@ -39,6 +39,19 @@ def placed(mesh: Mesh, world_from_model: F64, *, name: str, material: int) -> Su
     )
 
 
+def mesh_of_surface(surface: Surface) -> Mesh:
+    """A surface of a model's own frame as a mesh, flat where it has no normals."""
+    n, uvs = surface.normals, surface.uvs
+    return Mesh(
+        "",
+        surface.name,
+        surface.positions.astype(np.float64),
+        surface.faces,
+        None if uvs is None else uvs.astype(np.float64),
+        np.zeros((len(surface.positions), 3)) if n is None else n.astype(np.float64),
+    )
+
+
 def _normals(normals: F64, world_from_model: F64) -> F32 | None:
     """Unit normals by the inverse transpose, or None (flat) if one is zero."""
     n = normals @ np.linalg.inv(world_from_model[:3, :3])

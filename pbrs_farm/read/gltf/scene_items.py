@@ -29,6 +29,7 @@ from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.formats.glb import Gltf, entry
 from pbrs_farm.home.names import names_glass, names_mirror
 from pbrs_farm.read.common.furniture_classes import PieceSize
+from pbrs_farm.read.common.house_builder import unique_id
 from pbrs_farm.read.common.material_library import PANE_OPACITY
 from pbrs_farm.read.common.name_classes import UNMAPPED, NodeClass, class_of_node_name
 from pbrs_farm.read.common.notes import Notes
@@ -117,14 +118,10 @@ def items_of_scene(
             notes.add("outer-side", place, "its outer side is left out")
         # Give each part a unique id: names in glTF may repeat.
         for part in parts:
-            unique, k = part.id, 2
-            while unique in taken:
-                unique, k = f"{part.id}.{k}", k + 1
-            taken.add(unique)
             n_items += 1
             if n_items > MAX_INSTANCES:
                 raise BadHouse(gltf.file, place, f"more than {MAX_INSTANCES} items")
-            yield replace(part, id=unique)
+            yield replace(part, id=unique_id(part.id, taken))
 
 
 def _glazed(part: Item, whole: Item, materials: SceneMaterials) -> Item:

@@ -38,7 +38,7 @@ from pbrs_farm.read.common.doors_and_windows import fill_hole
 from pbrs_farm.read.common.format import GivenFile
 from pbrs_farm.read.common.furniture_classes import PieceSize
 from pbrs_farm.read.common.given_classes import GivenClass, given_class
-from pbrs_farm.read.common.house_builder import HouseBuilder, structure_item
+from pbrs_farm.read.common.house_builder import HouseBuilder, structure_item, unique_id
 from pbrs_farm.read.common.material_library import PANE_OPACITY, MaterialLibrary
 from pbrs_farm.read.common.name_classes import UNMAPPED, NodeClass, class_of_node_name
 from pbrs_farm.read.common.notes import Notes
@@ -201,11 +201,7 @@ class _Building:
             item = self._item(product, mesh)
             if item is None:
                 continue
-            unique, k = item.id, 2
-            while unique in taken:
-                unique, k = f"{item.id}.{k}", k + 1
-            taken.add(unique)
-            yield replace(item, id=unique)
+            yield replace(item, id=unique_id(item.id, taken))
 
     def _item(self, product: Any, mesh: ProductMesh) -> Item | None:
         product_class = self._class(product, mesh)
@@ -538,18 +534,9 @@ def _given(product: Any) -> GivenClass | None:
     if product.is_a("IfcSlab"):
         return GivenClass("floor", FLOOR)
     # Entities of other schema versions are handled as their supertype.
-    for entity in (
-        "IfcWall",
-        "IfcDoor",
-        "IfcWindow",
-        "IfcRoof",
-        "IfcStair",
-        "IfcColumn",
-        "IfcBeam",
-    ):
-        if product.is_a(entity):
-            return given_class("ifc", entity)
-    return None
+    supertypes = ["IfcWall", "IfcDoor", "IfcWindow", "IfcRoof", "IfcStair", "IfcColumn", "IfcBeam"]
+    entity = next(filter(product.is_a, supertypes), "")
+    return given_class("ifc", entity)
 
 
 def _part_of_wall(product: Any, mesh: ProductMesh) -> tuple[ItemKind, int, tuple[str, ...]]:

@@ -11,8 +11,7 @@ from pbrs_farm.core.arrays import F64, I32, I64, Bools
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.mesh import face_areas
 from pbrs_farm.core.shown_text import shown
-from pbrs_farm.read.mesh.shading_normals import crease_normals
-from pbrs_farm.read.mesh.triangulate import triangulated_corners
+from pbrs_farm.read.mesh.triangulate import crease_normals, triangulated_corners
 
 DEFAULT_CREASE_RAD = np.radians(45.0)
 _MANY_FACES = 50_000  # repeated faces are searched in parts of more faces

@@ -11,7 +11,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.mesh import face_areas, unit_vectors
 from pbrs_farm.read.mesh.obj import DEFAULT_CREASE_RAD, Mesh
-from pbrs_farm.read.mesh.shading_normals import crease_normals
+from pbrs_farm.read.mesh.triangulate import crease_normals
 
 _HEADER: Final = 84  # bytes before the facets, the last four of which count them
 _FACET: Final = np.dtype([("normal", "<f4", 3), ("corners", "<f4", (3, 3)), ("attribute", "<u2")])

@@ -7,12 +7,10 @@ Layouts: ShapeNet's `<synset>/<model id>/models/model_normalized.obj` (or `<mode
 
 from __future__ import annotations
 
-import csv
 import hashlib
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
-from importlib.resources import files
 from pathlib import Path
 from typing import Final
 
@@ -25,7 +23,7 @@ from pbrs_farm.read.catalogue.library_files import (
     opened_archive,
     parse_properties,
 )
-from pbrs_farm.read.common.furniture_classes import nyu40_of
+from pbrs_farm.read.common.furniture_classes import nyu40_of, rows_of_table
 
 _MODEL_SUFFIXES: Final = (".obj", ".glb", ".gltf")
 _PLAIN_FOLDERS: Final = ("models", "")  # ShapeNet's, that say nothing
@@ -171,5 +169,4 @@ def _id(category: str, name: str) -> str:
 
 @cache
 def _synsets() -> tuple[dict[str, str], ...]:
-    text = files("pbrs_farm.read.objects").joinpath("shapenet-synsets.csv").read_text("utf-8")
-    return tuple(csv.DictReader(text.splitlines()))
+    return tuple(rows_of_table("shapenet-synsets.csv", "objects"))

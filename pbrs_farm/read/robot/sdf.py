@@ -23,6 +23,7 @@ from pbrs_farm.read.common.source_files import RootFolder
 from pbrs_farm.read.robot.links import model_name
 from pbrs_farm.read.robot.urdf import (
     GREY,
+    KINDS,
     MAX_BYTES,
     Link,
     LinkJoint,
@@ -31,6 +32,7 @@ from pbrs_farm.read.robot.urdf import (
     numbers_of,
     parsed_xml,
     solid_of,
+    unit_axis,
 )
 
 _MODEL: Final = "__model__"
@@ -43,11 +45,6 @@ _GROUND: Final = (
     b"<size>100 100</size></plane></geometry></visual></link></model></sdf>"
 )
 _ENDLESS: Final = 1e3  # radians or metres; a wider limit means no limit
-_KINDS: Final = {
-    "revolute": JointKind.REVOLUTE,
-    "continuous": JointKind.REVOLUTE,
-    "prismatic": JointKind.PRISMATIC,
-}
 
 
 @dataclass(frozen=True, slots=True)
@@ -234,14 +231,11 @@ def _parents_first(rows: dict[str, Element], joint_of: dict[str, Element], file:
 
 def _joint(row: Element, parent_from_joint: F64, model_from_joint: F64, file: str) -> LinkJoint:
     name = str(row.get("name"))
-    place, kind = f"joint {name[:60]}", _KINDS.get(str(row.get("type")))
+    place, kind = f"joint {name[:60]}", KINDS.get(str(row.get("type")))
     axis = numbers_of(row.findtext("axis/xyz"), (0.0, 0.0, 1.0), file, place)
     if row.find("axis/use_parent_model_frame") is not None:
         is_of_model = row.findtext("axis/use_parent_model_frame") in ("1", "true")
         axis = model_from_joint[:3, :3].T @ axis if is_of_model else axis
-    length = float(np.linalg.norm(axis))
-    if length < 1e-9:
-        raise BadHouse(file, place, "its axis has no direction")
     limits = []
     for tag, sign in (("lower", -1.0), ("upper", 1.0)):
         text = (row.findtext(f"axis/limit/{tag}") or "").strip().lower()
@@ -251,7 +245,7 @@ def _joint(row: Element, parent_from_joint: F64, model_from_joint: F64, file: st
             raise BadHouse(file, place, f"{text[:40]!r} is not a number") from None
         endless = sign * np.pi if kind is JointKind.REVOLUTE else 0.0
         limits.append(limit if abs(limit) < _ENDLESS else endless)
-    return LinkJoint(name, kind, parent_from_joint, np.asarray(axis / length), *limits)
+    return LinkJoint(name, kind, parent_from_joint, unit_axis(axis, file, place), *limits)
 
 
 def _visual(row: Element, link_from_own: F64, file: str, place: str) -> Visual | None:

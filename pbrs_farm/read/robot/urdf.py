@@ -27,7 +27,7 @@ _SOLIDS: Final = {
     "sphere": (("radius", 1),),
     "plane": (("size", 2),),
 }  # solid -> its fields, each with its number of values
-_KINDS: Final = {
+KINDS: Final = {
     "revolute": JointKind.REVOLUTE,
     "continuous": JointKind.REVOLUTE,
     "prismatic": JointKind.PRISMATIC,
@@ -194,21 +194,27 @@ def _named(row: Element, tag: str, links: Mapping[str, Any], file: str) -> str:
 
 
 def _joint(row: Element, file: str) -> LinkJoint:
-    name, kind = str(row.get("name")), _KINDS.get(str(row.get("type")))
+    name, kind = str(row.get("name")), KINDS.get(str(row.get("type")))
     place = f"joint {name[:60]}"
     axis_row, limit = row.find("axis"), row.find("limit")
     axis = numbers_of(
         None if axis_row is None else axis_row.get("xyz"), (1.0, 0.0, 0.0), file, place
     )
-    length = float(np.linalg.norm(axis))
-    if length < 1e-9:
-        raise BadHouse(file, place, "its axis has no direction")
     turns = np.pi if row.get("type") == "continuous" else 0.0
     lower, upper = (
         float(numbers_of(None if limit is None else limit.get(key), (default,), file, place)[0])
         for key, default in (("lower", -turns), ("upper", turns))
     )
-    return LinkJoint(name, kind, _origin(row, file, place), axis / length, lower, upper)
+    direction = unit_axis(axis, file, place)
+    return LinkJoint(name, kind, _origin(row, file, place), direction, lower, upper)
+
+
+def unit_axis(axis: F64, file: str, place: str) -> F64:
+    """A joint's axis at length 1; BadHouse where it has no direction."""
+    length = float(np.linalg.norm(axis))
+    if length < 1e-9:
+        raise BadHouse(file, place, "its axis has no direction")
+    return np.asarray(axis / length)
 
 
 def _visuals(

@@ -3,10 +3,10 @@
 from __future__ import annotations
 
 import csv
-import io
 import math
 from collections import Counter
 from collections.abc import Iterator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Final
@@ -18,11 +18,11 @@ from pbrs_farm.core.classes import NYU40_NAMES, OTHERPROP
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Item, ItemKind, Surface
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.read.common.given_classes import GivenClass, box_only_item, class_by_words
+from pbrs_farm.read.common.given_classes import GivenClass, box_only_item, class_by_words, hssd_rows
 from pbrs_farm.read.common.json_values import NAME
 from pbrs_farm.read.common.material_library import MaterialLibrary
 from pbrs_farm.read.common.notes import HARMLESS, Notes
-from pbrs_farm.read.common.placed_mesh import assumed_light, oriented_box, placed
+from pbrs_farm.read.common.placed_mesh import assumed_light, mesh_of_surface, oriented_box, placed
 from pbrs_farm.read.common.source_files import RootFolder
 from pbrs_farm.read.gltf.document import gltf_document
 from pbrs_farm.read.gltf.materials import SceneMaterials
@@ -30,7 +30,7 @@ from pbrs_farm.read.gltf.node_classes import Mapping
 from pbrs_farm.read.gltf.scene_items import items_of_scene
 from pbrs_farm.read.mesh.obj import Mesh
 from pbrs_farm.read.scenestate.scene_document import PlacedModel
-from pbrs_farm.regular_files import MAX_SCENE_BYTES, text_from_bytes
+from pbrs_farm.regular_files import MAX_SCENE_BYTES
 
 _TABLES: Final = (
     "objects.csv",
@@ -101,7 +101,7 @@ class SceneModels:
         surfaces = self._surfaces(one.model, one.place)
         if not surfaces:
             return self._box_only(one, row, row_class, item_id)
-        meshes = [_mesh_of_surface(s) for s in surfaces]
+        meshes = [mesh_of_surface(s) for s in surfaces]
         world = one.world_from_scene @ one.scene_from_model @ _scene_from_file(one, meshes)
         all_surfaces = [
             placed(m, world, name=s.name, material=s.material)
@@ -187,14 +187,6 @@ class SceneModels:
 _STRUCTURE: Final = ("wall", "floor", "ceiling", "none", "opening-reveal")
 
 
-def _mesh_of_surface(s: Surface) -> Mesh:
-    normals = np.zeros((len(s.positions), 3)) if s.normals is None else s.normals
-    uvs = None if s.uvs is None else s.uvs.astype(np.float64)
-    return Mesh(
-        "", s.name, s.positions.astype(np.float64), s.faces, uvs, normals.astype(np.float64)
-    )
-
-
 def _scene_from_file(placed: PlacedModel, meshes: list[Mesh]) -> F64:
     """(4, 4) the scene's axes and units <- a GLB's: aligned, scaled, then centred as its source says."""
     up = placed.up if placed.asset.align.up is None else placed.asset.align.up
@@ -212,7 +204,7 @@ def _scene_from_file(placed: PlacedModel, meshes: list[Mesh]) -> F64:
 
 
 def _find_objects_csv(roots: list[RootFolder]) -> dict[str, _Row]:
-    """The rows of objects.csv by id: HSSD's has the id first and the category 15th."""
+    """The rows of objects.csv by id."""
     for root in roots:
         for name in _TABLES:
             try:
@@ -225,20 +217,12 @@ def _find_objects_csv(roots: list[RootFolder]) -> dict[str, _Row]:
 
 
 def _parse_objects_csv(data: bytes) -> dict[str, _Row]:
-    rows = csv.reader(io.StringIO(text_from_bytes(data, "replace")))
-    rows_of_id: dict[str, _Row] = {}
-    try:
-        head = [h.strip().lower() for h in next(rows, [])]
-        at_id = head.index("id") if "id" in head else 0
-        at_category = next((head.index(h) for h in ("main_category", "category") if h in head), 14)
-        at_size = next((k for k, h in enumerate(head) if h.endswith("dims")), -1)
-        for row in rows:
-            if len(row) > max(at_id, at_category) and row[at_category].strip():
-                size = _parse_size_cm(row[at_size]) if 0 <= at_size < len(row) else None
-                rows_of_id[row[at_id].strip()] = _Row(row[at_category].strip(), size)
-    except csv.Error:
-        return rows_of_id
-    return rows_of_id
+    rows: dict[str, _Row] = {}
+    with suppress(csv.Error):
+        for uid, category, size in hssd_rows(data):
+            if category:
+                rows[uid] = _Row(category, _parse_size_cm(size))
+    return rows
 
 
 def _parse_size_cm(text: str) -> tuple[float, float, float] | None:

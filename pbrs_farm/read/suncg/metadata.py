@@ -81,12 +81,17 @@ def table_places(name: str) -> tuple[str, str]:
     return f"metadata/{name}", name
 
 
-def _find_light_table(folder: RootFolder, *names: str) -> tuple[str, bytes] | None:
+def _find_table(
+    folder: RootFolder, *names: str, notes: Notes | None = None, lack: str = ""
+) -> tuple[str, bytes] | None:
+    """(place, bytes) of the first of some tables; without one None, and a note of what is lacking."""
     for name in names:
         for place in table_places(name):
             data = folder.read(place, max_bytes=_MAX_TABLE_BYTES)
             if data is not None:
                 return place, data
+    if notes is not None:
+        notes.add("missing-table", table_places(names[-1])[0], lack)
     return None
 
 
@@ -102,11 +107,9 @@ def _parse_csv(name: str, data: bytes) -> list[dict[str, str]]:
 
 
 def _read_class_table(folder: RootFolder, notes: Notes) -> dict[str, ModelClass]:
-    table = _find_light_table(folder, *CLASS_TABLES)
-    if table is None:
-        notes.add("missing-table", "metadata/ModelCategoryMapping.csv", "every object is otherprop")
-        return {}
-    return {row["model_id"]: _class(row) for row in _parse_csv(*table) if row.get("model_id")}
+    table = _find_table(folder, *CLASS_TABLES, notes=notes, lack="every object is otherprop")
+    rows = _parse_csv(*table) if table else []
+    return {row["model_id"]: _class(row) for row in rows if row.get("model_id")}
 
 
 def _class(row: dict[str, str]) -> ModelClass:
@@ -128,18 +131,16 @@ def _class(row: dict[str, str]) -> ModelClass:
 
 
 def _variants(folder: RootFolder) -> dict[str, tuple[str, ...]]:
-    table = _find_light_table(folder, VARIANT_TABLE)
-    if table is None:
-        return {}
-    rows = [(row.get("id", ""), row.get("variantIds", "")) for row in _parse_csv(*table)]
+    table = _find_table(folder, VARIANT_TABLE)
+    parsed = _parse_csv(*table) if table else []
+    rows = [(row.get("id", ""), row.get("variantIds", "")) for row in parsed]
     return {model: tuple(v.strip() for v in ids.split(",")) for model, ids in rows if ids}
 
 
 def _lamps(folder: RootFolder, notes: Notes) -> dict[str, LampMaterials]:
-    table = _find_light_table(folder, LAMP_TABLE)
+    text = "no lamp's bulb material is known; repair adds bulbs"
+    table = _find_table(folder, LAMP_TABLE, notes=notes, lack=text)
     if table is None:
-        text = "no lamp's bulb material is known; repair adds bulbs"
-        notes.add("missing-table", "metadata/light_geometry_compact.txt", text)
         return {}
     name, data = table
     lamps = {}
@@ -176,10 +177,9 @@ def _material_position(word: str) -> int:
 
 
 def _read_light_table(folder: RootFolder, notes: Notes) -> dict[str, tuple[LightPart, ...]]:
-    table_file = _find_light_table(folder, LIGHT_TABLE)
+    text = "no lamp's light is known; bulbs get an assumed power"
+    table_file = _find_table(folder, LIGHT_TABLE, notes=notes, lack=text)
     if table_file is None:
-        text = "no lamp's light is known; bulbs get an assumed power"
-        notes.add("missing-table", "metadata/suncgModelLights.json", text)
         return {}
     # Rows are model id -> its lamps; values that are not lists are ignored.
     name, data = table_file

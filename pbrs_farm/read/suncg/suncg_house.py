@@ -15,6 +15,7 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import MAX_INSTANCES, House, Item, ItemKind, Level, Room, Source, Surface
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.arch_elements import Arch
+from pbrs_farm.read.common.house_builder import unique_id
 from pbrs_farm.read.common.json_values import NAME
 from pbrs_farm.read.common.model_materials import ModelCache, ModelMaterials
 from pbrs_farm.read.common.notes import Notes
@@ -187,7 +188,7 @@ def _contents(
     for number, (_, nodes) in enumerate(record.levels):
         # Make ids unique and check the limits as items come up.
         for node, item in _level_contents(context, number, nodes, rooms):
-            unique = _unique(item.id, ids)
+            unique = unique_id(item.id, ids)
             if unique != item.id:
                 context.notes.add("duplicate-id", node.place, f"becomes {unique}")
             _check_extent(item, node, fields, file)
@@ -199,14 +200,6 @@ def _contents(
     # Clear the room of items whose room was left out.
     room_ids = {room.id for room in rooms}
     return rooms, [i if i.room_id in room_ids else replace(i, room_id=None) for i in items]
-
-
-def _unique(name: str, taken: set[str]) -> str:
-    unique, k = name, 2
-    while unique in taken:
-        unique, k = f"{name}.{k}", k + 1
-    taken.add(unique)
-    return unique
 
 
 def _level_contents(

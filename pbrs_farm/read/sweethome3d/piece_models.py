@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import posixpath
 import re
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -87,28 +87,24 @@ def moved(meshes: tuple[Mesh, ...], transformations: Transformations) -> tuple[M
 
 
 def _move_joints(mesh: Mesh, by_joint: dict[str, tuple[float, ...]]) -> Mesh:
-    for word in mesh.group.split():
-        # The hinge or rail itself stays where it is.
-        is_fixed = word.startswith(_FIXED)
-        joint = "" if is_fixed else joint_of(word)
-        if joint == "" and word.startswith("sweethome3d_") and "_on_rail" in word:
-            joint = "unique_rail"
-        if joint not in by_joint:
-            continue
-        return _transformed(mesh, np.array(by_joint[joint]).reshape(3, 4))
-    return mesh
+    joint = next((j for j in _hangers(mesh.group) if j in by_joint), None)
+    return mesh if joint is None else _transformed(mesh, np.array(by_joint[joint]).reshape(3, 4))
 
 
-def hanger_of(group: str) -> str:
-    """The joint that moves a group, "hinge_1"; "" for none, and for the hinge or rail itself."""
+def _hangers(group: str) -> Iterator[str]:
+    """The joints that a group names as moving it; the hinge or rail itself stays where it is."""
     for word in group.split():
         if word.startswith(_FIXED):
             continue
         if joint := joint_of(word):
-            return joint
-        if word.startswith("sweethome3d_") and "_on_rail" in word:
-            return "unique_rail"
-    return ""
+            yield joint
+        elif word.startswith("sweethome3d_") and "_on_rail" in word:
+            yield "unique_rail"
+
+
+def hanger_of(group: str) -> str:
+    """The joint that moves a group, "hinge_1"; "" for none, and for the hinge or rail itself."""
+    return next(_hangers(group), "")
 
 
 def fixed_joint_of(group: str) -> str:
@@ -119,8 +115,7 @@ def fixed_joint_of(group: str) -> str:
 
 def hangs_on(mesh: Mesh, joints: frozenset[str]) -> bool:
     """Whether a mesh is moved by one of some joints; the hinge or rail itself is not."""
-    words = mesh.group.split()
-    return any(joint_of(w) in joints and not w.startswith(_FIXED) for w in words)
+    return not joints.isdisjoint(_hangers(mesh.group))
 
 
 def _transformed(mesh: Mesh, matrix: F64) -> Mesh:

@@ -25,14 +25,10 @@ from pbrs_farm.read.mesh.triangulate import triangulated_corners
 
 _OFF_M: Final = 0.005  # offset of a flat light from its ceiling, metres
 # Other shape types, which are not triangulated.
-NOT_READ: Final = (
-    "BasisCurves",
-    "NurbsCurves",
-    "NurbsPatch",
-    "HermiteCurves",
-    "Points",
-    "TetMesh",
-    "Volume",
+_OTHERS: Final = "BasisCurves NurbsCurves NurbsPatch HermiteCurves Points TetMesh Volume"
+NOT_READ: Final = frozenset(_OTHERS.split())
+_PAIRS: Final = frozenset(
+    ["texCoord2f[]", "texCoord2d[]", "texCoord2h[]", "float2[]", "double2[]", "half2[]"]
 )
 
 
@@ -92,7 +88,8 @@ def _ints(value: Any) -> I64:
 
 def _texture_coordinates(prim: Any, time: Any, uv_name: str) -> tuple[F64 | None, str]:
     """(values, interpolation) of the texture coordinates of that name, else those called st before others."""
-    pairs = [p for p in UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithValues() if _is_pair(p)]
+    primvars = UsdGeom.PrimvarsAPI(prim).GetPrimvarsWithValues()
+    pairs = [p for p in primvars if str(p.GetTypeName()) in _PAIRS]
     names = (uv_name, "st", "UVMap", "st0", "st_0", "uv", "map1", "Texture_uv")
     order = {name: k for k, name in reversed(list(enumerate(names)))}
     pairs.sort(key=lambda p: order.get(p.GetPrimvarName(), len(names)))
@@ -100,17 +97,6 @@ def _texture_coordinates(prim: Any, time: Any, uv_name: str) -> tuple[F64 | None
         return None, ""
     values = pairs[0].ComputeFlattened(time)
     return (None, "") if values is None else (_float_rows(values, 2), pairs[0].GetInterpolation())
-
-
-def _is_pair(primvar: Any) -> bool:
-    return str(primvar.GetTypeName()) in (
-        "texCoord2f[]",
-        "texCoord2d[]",
-        "texCoord2h[]",
-        "float2[]",
-        "double2[]",
-        "half2[]",
-    )
 
 
 def _normals(mesh: Any, time: Any) -> tuple[F64 | None, str]:

@@ -10,8 +10,7 @@ from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.house import LightPart, Material, MaterialKind, Texture
 from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.geometry.solids import box, sphere
-from pbrs_farm.read.catalogue.read_catalogue import catalogue_from
-from pbrs_farm.read.catalogue.shape_store import ShapeStore
+from pbrs_farm.read.catalogue.read_catalogue import ShapeStore, catalogue_from
 from tests.read.catalogue.small_library import entry, library
 
 
