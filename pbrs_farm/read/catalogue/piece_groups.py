@@ -15,14 +15,16 @@ from typing import Final
 from pbrs_farm.core.catalogue import Place
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.house import ItemKind
-from pbrs_farm.read.common.furniture_classes import class_of_piece, plain, rows_of_table
+from pbrs_farm.read.common.furniture_classes import (
+    class_of_piece,
+    plain,
+    rows_of_table,
+    words_of_list,
+)
 
 Size = tuple[float, float, float]  # width, depth, height in metres
 
 _ASIDE: Final = frozenset(["with", "and", "on", "of", "for", "from", "under", "without", "in"])
-_OUTDOORS: Final = "exterior characters character vehicles vehicle staircases people road garden"
-_OUTSIDE: Final = frozenset(_OUTDOORS.split())
-"""Categories that are never inside a room."""
 _LONGEST_PHRASE: Final = 5  # words
 _LAMP: Final = "lamp"
 
@@ -81,7 +83,7 @@ def group_rule(
     if group:
         named = [r for r in group_rules() if r.group == group] or _rules_of(group)
         return next((r for r in named if r.fits("", size)), named[0] if named else None)
-    if _OUTSIDE & set(plain(category).split()):
+    if words_of_list("outdoors") & set(plain(category).split()):
         return None
     for text in (name, inner):
         rule = _rule_by_words(text, category, size)

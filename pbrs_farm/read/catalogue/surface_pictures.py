@@ -1,6 +1,6 @@
 """Photographed surfaces of libraries: textures of the packages' models, and texture libraries.
 
-surface-pictures.csv: reviewed seamless pictures with the size of one repeat. Grain runs along u.
+surface_groups.csv: words of each group, the first match wins. surface-pictures.csv: reviewed seamless pictures with the size of one repeat. Grain runs along u.
 Effects: reads the libraries.
 """
 
@@ -39,23 +39,6 @@ TEXTURES: Final = "PluginTexturesCatalog.properties"
 JAR_TEXTURES: Final = "com/eteks/sweethome3d/io/DefaultTexturesCatalog.properties"
 MOST_OF_A_GROUP: Final = 24  # maximum pictures of a group per library
 _EDGE_PX: Final = 1024
-_GROUPS: Final = (
-    ("tiles", "tile ceramic mosaic porcelain terracotta"),
-    ("brick", "brick"),
-    ("marble", "marble"),
-    ("granite", "granite terrazzo"),
-    ("leather", "leather"),
-    ("carpet", "carpet rug moquette"),
-    ("cloth", "cloth fabric textile denim linen wool cotton velvet"),
-    ("wallpaper", "wallpaper paper"),
-    ("plaster", "plaster roughcast stucco"),
-    ("concrete", "concrete cement"),
-    ("metal", "metal steel iron copper brass"),
-    ("stone", "stone rock slate paving"),
-    ("planks", "parquet plank floorboard floorboards laminate floor flooring"),
-    ("wood", "wood wooden oak pine beech walnut ash maple cherry teak"),
-)
-"""Surface group by whole words of name and category; the first match wins."""
 _PLACES: Final = ("floor", "wall", "sky")  # categories that do not describe the surface
 MOST_PICTURES: Final = 200  # of one folder; the rest, by name, is left out
 _SUFFIXES: Final = (".jpg", ".jpeg", ".png")
@@ -117,13 +100,19 @@ def _pictures_of_library(
             yield picture
 
 
+@cache
+def _words_of_groups() -> dict[str, frozenset[str]]:
+    rows = rows_of_table("surface_groups.csv", "catalogue")
+    return {row["group"]: frozenset(row["words"].split("|")) for row in rows}
+
+
 def surface_group(name: str, category: str) -> str:
     """Group of a surface, by whole English words of its name, then of its category; "" = unknown."""
     for text in (name, category if plain(category) not in _PLACES else ""):
         words = set(plain(text).replace("-", " ").replace("_", " ").split())
         words |= {w.removesuffix("s") for w in words}
-        for group, words_of_group in _GROUPS:
-            if words & set(words_of_group.split()):
+        for group, words_of_group in _words_of_groups().items():
+            if words & words_of_group:
                 return group
     return ""
 

@@ -22,36 +22,13 @@ _PRIMITIVES: Final = frozenset(
     {"eTeks#texturableBox", "eTeks#texturableCylinder", "eTeks#texturableTriangle"}
 )
 _PRIMITIVE_NAMES: Final = frozenset({"box", "cylinder", "triangle", ""})
-# Words after these describe the item; its noun comes before them.
-_ASIDES: Final = """with and on of for from under without in mit und auf fur von aus ohne avec et
-    sur de du des pour en con para del della di da do dos sem sin senza per met voor van op для w
-    two three four five six"""
-_ASIDE: Final = frozenset(_ASIDES.split())
 _MODIFIERS: Final = frozenset({"wall", "kitchen"})  # give the place of an unknown item
 _HEAD_FIRST: Final = frozenset({"fr", "es", "it", "pt"})  # languages with the noun first
 _LONGEST_PHRASE: Final = 4  # words
-
-# "Light" before these is a shade: light oak, light grey.
-_TINT_WORDS: Final = """ash beech beige birch blue brick brown concrete cream fabric gray green grey leather maple
-    marble metal oak orange pine pink purple red stone tile walnut wood wooden yellow"""
-_TINTS: Final = frozenset(_TINT_WORDS.split())
 # Names that programs give to new primitives, of any size.
 _DEFAULT_NAME: Final = re.compile(
     r"(chamfer)?box(_?\d+|\.\d+)|gameobject\d*|skp_camera.*", re.IGNORECASE
 )
-# Beside these a kind of tree is a wood, a flower a pattern or a tint.
-_MATERIAL_WORDS: Final = """fabric gold grain laminate lumber parquet pattern plank planks plywood texture timber veneer
-    wallpaper wood wooden"""
-_OF_MATERIALS: Final = frozenset(_MATERIAL_WORDS.split())
-# "Bed room", "girl bedroom": a place, not the bed or the person.
-_THINGS_OF_ROOMS: Final = (
-    "bath bed box closet computer game laundry locker plant shower storage toilet tv"
-)
-_OWNERS_OF_ROOMS: Final = "baby boy child children girl guest kid kids man men people woman women"
-_OF_A_ROOM: Final = {
-    "room": frozenset(f"{_THINGS_OF_ROOMS} {_OWNERS_OF_ROOMS}".split()),
-    **dict.fromkeys(("bedroom", "bathroom", "toilet"), frozenset(_OWNERS_OF_ROOMS.split())),
-}
 
 PERSON_WORD: Final = "person"
 PLANT_WORD: Final = "plant"
@@ -63,11 +40,6 @@ _LEAST_LAWN_M: Final = 1.0  # minimum shorter side of a lawn, metres
 _FLATTEST_PLANT: Final = 0.1  # minimum height over shorter side; flatter plants cover the ground
 _SLIMMEST_CROWN: Final = 0.25  # of the longer side
 _OFF_SCALE: Final = 2.0  # of the maximum size, for a file whose scale is a little off
-# Items sold with a mirror ("Sink_mirror"); other items are mirrored copies ("Chair_mirror").
-_OWNERS: Final = (
-    "bathtub bed cabinet desk dresser otherfurniture otherstructure shelves sink table toilet"
-)
-_OWNERS_OF_MIRRORS: Final = frozenset(_OWNERS.split())
 _THINNEST_COPY: Final = 0.2  # minimum thickness over the middle side of a mirrored copy
 _STANDING: Final = frozenset({"bathtub", "bed", "chair", "desk", "sofa", "table", "toilet"})
 
@@ -126,6 +98,13 @@ def rows_of_table(name: str, folder: str = "common") -> list[dict[str, str]]:
 
 
 @cache
+def words_of_list(name: str) -> frozenset[str]:
+    """The words or phrases of a row of word_lists.csv."""
+    words = {row["list"]: row["words"] for row in rows_of_table("word_lists.csv")}
+    return frozenset(words[name].split("|"))
+
+
+@cache
 def _sizes() -> Mapping[str, tuple[float, float, float, float]]:
     """Class -> least and most of the longer horizontal side, then of the height, metres.
 
@@ -180,10 +159,14 @@ _LONGEST_NAME: Final = 500  # maximum letters of a name to analyse
 def _words_in_order(name: str) -> list[str]:
     """Words and separate numbers, without words for the item's place and numbers inside words ("chair01")."""
     words = re.findall(r"(?<![^\W_])\d+|[^\W\d_]+", plain(name))
-    of_rooms = {
-        k for k, (word, after) in enumerate(pairwise(words)) if word in _OF_A_ROOM.get(after, ())
-    }
+    of_rooms = {k for k, (word, after) in enumerate(pairwise(words)) if _is_of_a_room(word, after)}
     return [word for k, word in enumerate(words) if k not in of_rooms]
+
+
+def _is_of_a_room(word: str, after: str) -> bool:
+    is_owned = after in ("room", "bedroom", "bathroom", "toilet")
+    is_owner = is_owned and word in words_of_list("owner of a room")
+    return is_owner or (after == "room" and word in words_of_list("thing of a room"))
 
 
 @lru_cache(maxsize=4096)
@@ -195,8 +178,8 @@ def _found_candidates(name: str) -> Iterator[_Candidate]:
     # Classes or kinds for the words of a name, likeliest first. Words before a preposition come
     # first
     # ("lamp with table" is a lamp), and a separate number begins a new part.
-    words = _words_in_order(name)
-    aside = next((k for k, w in enumerate(words) if k and (w in _ASIDE or w.isdigit())), len(words))
+    words, asides = _words_in_order(name), words_of_list("aside")
+    aside = next((k for k, w in enumerate(words) if k and (w in asides or w.isdigit())), len(words))
     # A phrase from the first word may hold an aside: "table de nuit".
     for n in range(min(_LONGEST_PHRASE, len(words)), 1, -1):
         whole = _class_of_phrase(" ".join(words[:n]))
@@ -234,9 +217,9 @@ def _from_the_noun(words: list[str], *, is_head: bool) -> Iterator[_Candidate]:
 def _is_a_tint(phrase: str, words: list[str], end: int) -> bool:
     """Whether words[..end], a phrase, name a colour or a wood there, not a lamp or a plant."""
     if phrase == "light":
-        return end < len(words) and words[end] in _TINTS
+        return end < len(words) and words[end] in words_of_list("tint")
     is_said = phrase == "mat" or is_also_a_material(phrase)  # "wood mat": short for material
-    return is_said and not _OF_MATERIALS.isdisjoint(words)
+    return is_said and not words_of_list("of a material").isdisjoint(words)
 
 
 def is_also_a_material(phrase: str) -> bool:
@@ -326,7 +309,7 @@ def _is_a_mirrored_copy(
     if not (is_last and candidates and candidates[0].phrase == "mirror"):
         return False
     owner = next((c.label for c in candidates if c.label != "mirror"), None)
-    if owner is None or owner not in _OWNERS_OF_MIRRORS or has_copy_suffix(name):
+    if owner is None or owner not in words_of_list("owner of a mirror") or has_copy_suffix(name):
         return owner is not None
     if place is None:
         return False

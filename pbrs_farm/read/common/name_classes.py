@@ -23,29 +23,15 @@ from pbrs_farm.read.common.furniture_classes import (
     kind_of,
     plain,
     stands_as_a_tree,
+    words_of_list,
 )
 
-_WALL_WORDS: Final = "wall wallpaper facade wand waende tapete mur muro pared parete parede"
-_CEILING_WORDS: Final = "ceiling celling zimmerdecke decke plafond techo soffitto teto"
-_FLOOR_WORDS: Final = (
-    "floor flooring boden fussboden parquet parkett laminate laminat linoleum sol suelo pavimento"
-)
 # Word of a name -> kind, the words of walls first ("wall above the floor" is a wall).
 STRUCTURE_WORDS: Final = {
     word: kind
-    for kind, words in (
-        (ItemKind.WALL, _WALL_WORDS),
-        (ItemKind.CEILING, _CEILING_WORDS),
-        (ItemKind.FLOOR, _FLOOR_WORDS),
-        (ItemKind.GROUND, "ground terrain grassland lawn turf"),
-    )
-    for word in words.split()
+    for kind in (ItemKind.WALL, ItemKind.CEILING, ItemKind.FLOOR, ItemKind.GROUND)
+    for word in words_of_list(kind)
 }
-# Fixed to walls and ceilings, and none of them.
-_BUILT_WORDS: Final = (
-    "beam column pillar pipe duct vent railing handrail banister balustrade skirting"
-)
-_PARTS_OF_BUILDINGS: Final = frozenset(_BUILT_WORDS.split())
 _LEAST_STRUCTURE_M: Final = 0.2  # a tile of a floor is as large
 _ROOMS_AND_CABINETS: Final = frozenset({"closet", "kitchen", "kitchenette", "pantry", "storage"})
 _REVIT_NAME: Final = re.compile(r'^M_|:.*:\d+$|[ "-].*:|:.*[ "-]')
@@ -178,4 +164,4 @@ def _is_small(size: PieceSize) -> bool:
 
 
 def _may_be_wall(nyu40: int, words: frozenset[str]) -> bool:
-    return nyu40 == OTHERSTRUCTURE and not words & _PARTS_OF_BUILDINGS
+    return nyu40 == OTHERSTRUCTURE and not words & words_of_list("built")

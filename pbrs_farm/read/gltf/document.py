@@ -18,6 +18,7 @@ from pbrs_farm.core.checked_json import json_from_bytes
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import affine, rotation_of_quaternion
 from pbrs_farm.formats.glb import Gltf, accessor_array, entry, gltf_from_glb, view_bytes
+from pbrs_farm.read.common.furniture_classes import rows_of_table
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.gltf.compressed import draco_arrays
 from pbrs_farm.read.mesh.obj import Mesh
@@ -30,30 +31,13 @@ MAX_NODES: Final = 200_000  # of the scene; a node may have several instances
 MAX_DEPTH: Final = 200  # levels of the node tree
 _MOVES: Final = frozenset({"matrix", "rotation", "scale", "translation"})  # keys of a node
 
-# Extensions that a file may require.
-# fmt: off
-UNDERSTOOD: Final = frozenset({
-    "KHR_lights_punctual", "KHR_materials_emissive_strength", "KHR_materials_ior",
-    "KHR_materials_specular", "KHR_materials_transmission", "KHR_materials_unlit",
-    "KHR_mesh_quantization", "KHR_texture_transform", "EXT_texture_webp",
-    "KHR_draco_mesh_compression", "KHR_texture_basisu", "KHR_materials_pbrSpecularGlossiness",
-    "EXT_mesh_gpu_instancing",
-})
-# fmt: on
+# Use of each extension: files may require those that are read; others are unseen without a visible effect
+# for a reader that ignores them: a fallback is included, or they do not concern the picture.
+_USES: Final = {row["name"]: row["use"] for row in rows_of_table("extensions.csv", "gltf")}
 _INSTANCING: Final = "EXT_mesh_gpu_instancing"
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6  # values of primitive.mode
 UNREAD: Final = "unread-part"
 _WRAPS: Final = {33071: CLAMP, 33648: MIRROR}  # values of sampler.wrapS
-
-# Extensions without visible effect for a reader that ignores them: a fallback is included
-# (compressed meshes, pictures), or they do not concern the picture.
-# fmt: off
-_UNSEEN: Final = frozenset({
-    "KHR_draco_mesh_compression", "EXT_meshopt_compression", "KHR_texture_basisu",
-    "EXT_texture_avif", "MSFT_texture_dds", "KHR_materials_variants", "KHR_xmp", "KHR_xmp_json_ld",
-    "KHR_animation_pointer", "FB_geometry_metadata",
-})
-# fmt: on
 
 _Row = dict[str, Any]
 
@@ -156,7 +140,7 @@ def _check_extensions(gltf: Gltf) -> None:
     """Reject what the file says it cannot be read without."""
     required = gltf.document.get("extensionsRequired", [])
     for name in required if isinstance(required, list) else []:
-        if name not in UNDERSTOOD:
+        if not isinstance(name, str) or _USES.get(name) != "read":
             text, hint = f"{str(name)[:60]!r} is not supported", "export again without it"
             raise BadHouse(gltf.file, "extensionsRequired", text, hint=hint)
 
@@ -477,7 +461,7 @@ def note_unread(gltf: Gltf, notes: Notes) -> None:
     """Note, once per file, each unread extension that affects the picture and what uses it."""
     used = gltf.document.get("extensionsUsed")
     for name in used if isinstance(used, list) else []:
-        if name not in UNDERSTOOD and name not in _UNSEEN:
+        if not isinstance(name, str) or name not in _USES:
             notes.add(UNREAD, "extensionsUsed", f"{name} is not supported: its content is missing")
     primitives = [
         _object_rows(mesh.get("primitives")) for mesh in _object_rows(gltf.document.get("meshes"))

@@ -14,6 +14,7 @@ from pbrs_farm.core.frames import LUMINANCE, linear_from_srgb, srgb_from_linear
 from pbrs_farm.core.house import NOTHING_LEFT, USUAL_CUTOFF, Material, MaterialKind
 from pbrs_farm.formats.glb import Gltf, entry
 from pbrs_farm.home.names import FRAME_WORDS, GLASS_WORDS, words_of
+from pbrs_farm.read.common.furniture_classes import words_of_list
 from pbrs_farm.read.common.material_fields import noted_fields
 from pbrs_farm.read.common.material_library import (
     OPAQUE_ALPHA,
@@ -47,9 +48,6 @@ from pbrs_farm.read.mesh.texture_wraps import REPEAT, Wraps, leaves_picture, wra
 F0: Final = 0.04
 
 MAX_SHININESS: Final = 10_000.0  # Phong exponent; above it a lobe is a mirror's
-_WINDOW: Final = frozenset(
-    ("window", "fenster", "fenetre", "ventana", "finestra", "raam", "fonster", "vindu")
-)
 
 
 @dataclass(frozen=True, slots=True)
@@ -421,7 +419,8 @@ def glass_materials(gltf: Gltf, numbers: Iterable[int | None]) -> frozenset[int]
     glass = frozenset(n for n, w in words.items() if w & GLASS_WORDS and not w & FRAME_WORDS)
     if glass or any(_lets_light_through(row) for row in rows.values()):
         return glass
-    return frozenset(n for n, w in words.items() if w & _WINDOW and not w & FRAME_WORDS)
+    panes = words_of_list("window pane")
+    return frozenset(n for n, w in words.items() if w & panes and not w & FRAME_WORDS)
 
 
 def material_names(gltf: Gltf, node: dict[str, Any]) -> tuple[str, ...]:

@@ -16,7 +16,7 @@ from pbrs_farm.core.classes import DOOR, OTHERSTRUCTURE, WALL, WINDOW
 from pbrs_farm.core.house import Box, Item, ItemKind, Surface, corners_of_surfaces
 from pbrs_farm.core.mesh import closed_edge_share
 from pbrs_farm.home.names import names_glass, words_of
-from pbrs_farm.read.common.furniture_classes import PieceSize
+from pbrs_farm.read.common.furniture_classes import PieceSize, words_of_list
 from pbrs_farm.read.common.house_builder import CLASS_OF_STRUCTURE
 from pbrs_farm.read.common.name_classes import UNMAPPED, class_of_material_name
 from pbrs_farm.read.common.room_shells import (
@@ -127,18 +127,6 @@ _MOST_CLOSED: Final = 300  # parts tested for being closed, the largest first
 _BESIDE_M: Final = 0.06  # fittings closer than this are one item, metres
 _MOST_PARTS: Final = 3_000  # in a mesh of more parts, neighbours are not searched
 
-# Words of names of materials, accents folded.
-_WINDOWS: Final = """window fenster fenetre ventana finestra raam fonster vindu glazing sash sill mullion
-    louvre louver slat slats blind blinds shutter jalousie"""
-_WINDOW_WORDS: Final = frozenset(_WINDOWS.split())
-_FRAME_WORDS: Final = frozenset(
-    ["frame", "frames", "trim", "casing", "rahmen", "cadre", "marco", "telaio", "kozijn"]
-)
-_DOOR_WORDS: Final = frozenset(["door", "doors", "tur", "porte", "puerta", "porta", "deur"])
-_SKIRTINGS: Final = """skirting baseboard baseboards sockelleiste fussleiste plinthe rodapie battiscopa plint
-    listwa"""
-_SKIRTING_WORDS: Final = frozenset(_SKIRTINGS.split())
-
 
 def parted_fittings(item: Item, *, by_shape: bool) -> tuple[Item, tuple[Item, ...]]:
     """The item without a room's fittings, and the fittings, touching parts merged.
@@ -180,13 +168,13 @@ def _said(surfaces: Sequence[Surface]) -> I64:
 
 def _of_name(name: str) -> int:
     words = words_of(name)
-    if words & _SKIRTING_WORDS:
+    if words & words_of_list("skirting"):
         return _SKIRTED
-    if words & _DOOR_WORDS:
+    if words & words_of_list("door"):
         return _DOORLIKE
-    if names_glass(name) or words & _WINDOW_WORDS:
+    if names_glass(name) or words & words_of_list("window"):
         return _GLAZED
-    return _FRAMED if words & _FRAME_WORDS else _UNSAID
+    return _FRAMED if words & words_of_list("frame") else _UNSAID
 
 
 def _connected_parts(corners: F64, kind_of_face: I64) -> I64:

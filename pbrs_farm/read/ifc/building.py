@@ -36,7 +36,7 @@ from pbrs_farm.home.names import names_glass, words_of
 from pbrs_farm.home.room_use import RoomKind, named_kind
 from pbrs_farm.read.common.doors_and_windows import fill_hole
 from pbrs_farm.read.common.format import GivenFile
-from pbrs_farm.read.common.furniture_classes import PieceSize
+from pbrs_farm.read.common.furniture_classes import PieceSize, words_of_list
 from pbrs_farm.read.common.given_classes import GivenClass, given_class
 from pbrs_farm.read.common.house_builder import HouseBuilder, structure_item, unique_id
 from pbrs_farm.read.common.material_library import PANE_OPACITY, MaterialLibrary
@@ -46,7 +46,7 @@ from pbrs_farm.read.common.openings import openings, openings_of_voids
 from pbrs_farm.read.common.placed_mesh import across_last, assumed_light, oriented_box, placed
 from pbrs_farm.read.common.room_floors import covered_share, floor_polygon
 from pbrs_farm.read.common.rooms import rooms_from_floors, rooms_from_walls
-from pbrs_farm.read.ifc.ceilings import NEAR_M, ROOF_WORDS, Overheads, with_roofs
+from pbrs_farm.read.ifc.ceilings import NEAR_M, Overheads, with_roofs
 from pbrs_farm.read.ifc.doors_and_windows import (
     glass_parts,
     hole_of_undrawn,
@@ -79,7 +79,6 @@ _PIECES: Final = (
 _BETWEEN: Final = re.compile(r"[-:;,/&+()]")  # parts of a name
 _UPWARD: Final = 0.05  # y of the normal of a face of a body's top, at least
 _LEVEL_M: Final = 0.01  # a top whose heights differ less is level
-_ATTIC_WORDS: Final = ROOF_WORDS | {"attic", "dachraum", "dachboden", "loft", "чердак"}
 
 
 def read_ifc(given: GivenFile, fields: ReadFields) -> House:
@@ -587,7 +586,7 @@ def _on_its_floor(room: Room, items: Sequence[Item]) -> Room:
 
 
 def _is_called_attic(name: str) -> bool:
-    return bool(words_of(name) & _ATTIC_WORDS)
+    return bool(words_of(name) & (words_of_list("roof") | words_of_list("attic")))
 
 
 def _rooms_between_walls(

@@ -20,6 +20,7 @@ from pbrs_farm.core.house import Item, ItemKind, Room, corners_of_surfaces
 from pbrs_farm.core.mesh import closed_edge_share, unit_normals
 from pbrs_farm.geometry.heights import lowest_above
 from pbrs_farm.home.names import words_of
+from pbrs_farm.read.common.furniture_classes import words_of_list
 
 NEAR_M: Final = 0.35  # from the end of a space's body to the floor or ceiling that bounds it
 _SAMPLES: Final = 3000  # of a room's plan
@@ -31,19 +32,6 @@ _HALF: Final = 0.5  # share of a room, or of a slab, that counts as most of it
 _JOINT_M: Final = 0.6  # maximum distance from a wall's end to the slab below or above it, metres
 _WELD_DECIMALS: Final = 4  # of metres: corners nearer than .1 mm are one
 _CARRIES: Final = 0.1  # share of a slab's plan that a space on it covers at least
-
-_ROOF_NAMES: Final = (
-    "roof roofing flatroof dach dachhaut flachdach steildach satteldach pultdach walmdach dachplatte "
-    "dachdecke dachflache dachschrage toit toiture tetto copertura cubierta tejado azotea telhado "
-    "cobertura dak dakvloer plattedak yttertak takplatta katto ylapohja vesikatto strecha stropodach "
-    "teto acoperis cati крыша кровля дах στεγη 屋根 屋上 屋顶 屋頂 屋面 지붕"
-)
-ROOF_WORDS: Final = frozenset(_ROOF_NAMES.split())
-"""Words of roofs, folded: names of slabs and spaces in the languages of exporters."""
-_TERRACE_NAMES: Final = (
-    "terrace terrasse dachterrasse terraza terrazza deck balcony balkon floor boden"
-)
-_NO_ROOF_WORDS: Final = frozenset(_TERRACE_NAMES.split())
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -137,7 +125,7 @@ def with_roofs(items: Sequence[Item], rooms: Sequence[Room]) -> list[Item]:
 def is_called_roof(name: str) -> bool:
     """True if a name contains roof, and is not a place on a roof (a roof terrace)."""
     words = words_of(name)
-    return bool(words & ROOF_WORDS) and not words & _NO_ROOF_WORDS
+    return bool(words & words_of_list("roof")) and not words & words_of_list("no roof")
 
 
 def _carries_room(slab: Item, rooms: Sequence[Room]) -> bool:

@@ -13,6 +13,7 @@ from pbrs_farm.core.frames import transform_points
 from pbrs_farm.core.house import Item, ItemKind, Opening
 from pbrs_farm.home.names import words_of
 from pbrs_farm.read.common.doors_and_windows import Hole
+from pbrs_farm.read.common.furniture_classes import words_of_list
 from pbrs_farm.read.common.name_classes import class_of_node_name
 from pbrs_farm.read.common.openings import Void
 from pbrs_farm.read.ifc.meshes import ProductMesh
@@ -21,18 +22,6 @@ _THIN_M: Final = 0.045  # maximum thickness of a window part that may be glass, 
 _THRESHOLD_M: Final = 0.3  # above the storey: a door begins lower
 _SILL_M: Final = 0.5  # above the storey: what begins higher may be a window
 _DOOR_HEIGHT_M: Final = 1.7  # least height of a door
-# Families of doors whose names do not say door (of Revit's libraries): all words of one.
-# fmt: off
-_DOOR_FAMILIES: Final = (
-    "single flush", "double flush", "single glass", "double glass", "single panel", "double panel", "raised panel", "sliding closet",
-    "bifold", "bi fold", "bypass", "pocket slider", "overhead rolling", "overhead sectional",
-)
-# fmt: on
-# fmt: off
-_WINDOW_FAMILIES: Final = (
-    "fixed", "casement", "awning", "hopper", "hung", "skylight", "sash", "transom", "archtop",
-)
-# fmt: on
 _BEFORE_M: Final = 0.1  # maximum distance of a window's middle from its hole
 _SLIDING: Final = frozenset({"sliding", "slider", "bifold", "fold", "bypass", "pocket"})
 _GARAGE: Final = frozenset({"overhead", "garage"})
@@ -51,8 +40,8 @@ def kind_of_opening(
 
     row = element.get_type(product)
     typed = row.is_a() if row is not None else ""
-    says_door = any(_says(n, DOOR, _DOOR_FAMILIES) for n in names)
-    says_window = any(_says(n, WINDOW, _WINDOW_FAMILIES) for n in names)
+    says_door = any(_says(n, DOOR, "door family") for n in names)
+    says_window = any(_says(n, WINDOW, "window family") for n in names)
     is_standing = foot_m < _THRESHOLD_M and height_m > _DOOR_HEIGHT_M
     if kind is ItemKind.WINDOW and is_standing:
         is_door = typed.startswith("IfcDoor") or (says_door and not says_window)
@@ -63,11 +52,11 @@ def kind_of_opening(
     return kind
 
 
-def _says(name: str, nyu40: int, families: Sequence[str]) -> bool:
+def _says(name: str, nyu40: int, families: str) -> bool:
     words = words_of(name)
     classes = (class_of_node_name(word) for word in words)
     return any(c is not None and c.nyu40 == nyu40 for c in classes) or any(
-        words.issuperset(family.split()) for family in families
+        words.issuperset(family.split()) for family in words_of_list(families)
     )
 
 

@@ -8,6 +8,7 @@ from collections import Counter
 from collections.abc import Iterator
 from contextlib import suppress
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Final
 
@@ -18,6 +19,7 @@ from pbrs_farm.core.classes import NYU40_NAMES, OTHERPROP
 from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Item, ItemKind, Surface
 from pbrs_farm.core.recipe import ReadFields
+from pbrs_farm.read.common.furniture_classes import rows_of_table
 from pbrs_farm.read.common.given_classes import GivenClass, box_only_item, class_by_words, hssd_rows
 from pbrs_farm.read.common.json_values import NAME
 from pbrs_farm.read.common.material_library import MaterialLibrary
@@ -40,19 +42,6 @@ _TABLES: Final = (
 )
 _MAX_TABLE_BYTES: Final = 64_000_000
 _BESIDE: Final = ("", "..", "../..")  # where models and tables lie when no folder is named
-
-# Default width, height, depth by class for items with a missing model, metres.
-# fmt: off
-_USUAL: Final = {
-    "bathtub": (1.7, 0.58, 0.75), "bed": (1.6, 0.9, 2.05), "bookshelf": (0.9, 1.8, 0.32),
-    "cabinet": (0.9, 0.9, 0.45), "chair": (0.52, 0.85, 0.55), "counter": (1.2, 0.9, 0.6),
-    "curtain": (1.6, 2.3, 0.12), "desk": (1.3, 0.75, 0.65), "dresser": (1.0, 0.85, 0.48),
-    "floor mat": (1.8, 0.012, 1.2), "lamp": (0.35, 0.6, 0.35), "mirror": (0.6, 0.9, 0.03),
-    "night stand": (0.48, 0.52, 0.4), "picture": (0.6, 0.5, 0.03), "refrigerator": (0.65, 1.75, 0.65),
-    "shelves": (0.9, 1.6, 0.35), "sink": (0.6, 0.85, 0.48), "sofa": (1.95, 0.8, 0.9),
-    "table": (1.3, 0.74, 0.85), "television": (1.1, 0.65, 0.08), "toilet": (0.38, 0.75, 0.68),
-}
-# fmt: on
 
 
 @dataclass(frozen=True, slots=True)
@@ -131,7 +120,7 @@ class SceneModels:
         self, placed: PlacedModel, row: _Row | None, cls: GivenClass | None, item_id: str
     ) -> Item | None:
         name = NYU40_NAMES[cls.nyu40] if cls and 0 <= cls.nyu40 < len(NYU40_NAMES) else ""
-        size = (row.size if row else None) or _USUAL.get(name)
+        size = (row.size if row else None) or _usual_sizes().get(name)
         if row is None or size is None:
             self.missing[placed.model] += 1
             return None
@@ -201,6 +190,15 @@ def _scene_from_file(placed: PlacedModel, meshes: list[Mesh]) -> F64:
         low, high = points.min(0), points.max(0)
         matrix[:3, 3] = -(low + placed.asset.centre * (high - low))
     return matrix
+
+
+@cache
+def _usual_sizes() -> dict[str, tuple[float, float, float]]:
+    """Width, height, depth by class of items without a model and a size, metres."""
+    return {
+        row["class"]: (float(row["width"]), float(row["height"]), float(row["depth"]))
+        for row in rows_of_table("usual_sizes.csv", "scenestate")
+    }
 
 
 def _find_objects_csv(roots: list[RootFolder]) -> dict[str, _Row]:

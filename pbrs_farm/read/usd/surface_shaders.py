@@ -6,12 +6,16 @@ shaders are not supported: their material is a matte grey, with a note.
 
 from __future__ import annotations
 
-from typing import Any, Final, NamedTuple
+from pathlib import Path
+from typing import Any, Final
+
+from pbrs_farm.core.record import Record, read_csv
 
 
-class SurfaceWords(NamedTuple):
+class SurfaceWords(Record):
     """Names of a surface shader's inputs ("" = none), and their defaults."""
 
+    shader: str
     colour: str
     roughness: str
     metallic: str
@@ -26,40 +30,9 @@ class SurfaceWords(NamedTuple):
     default_metallic: float = 0.0
 
 
-_PREVIEW: Final = SurfaceWords(
-    "diffuseColor",
-    "roughness",
-    "metallic",
-    "opacity",
-    "normal",
-    "emissiveColor",
-    default_colour=0.18,
-)
-# fmt: off
-_STANDARD: Final = SurfaceWords(
-    "base_color", "specular_roughness", "metalness", "opacity", "normal", "emission_color",
-    "base", "emission", "transmission", default_roughness=0.2,
-)
-# fmt: on
-# fmt: off
-_GLTF: Final = SurfaceWords(
-    "base_color", "roughness", "metallic", "alpha", "normal", "emissive",
-    transmission="transmission", default_colour=1.0, default_roughness=1.0, default_metallic=1.0,
-)
-# fmt: on
-# fmt: off
-_OPEN: Final = SurfaceWords(
-    "base_color", "specular_roughness", "base_metalness", "geometry_opacity", "geometry_normal",
-    "emission_color", "base_weight", "emission_luminance", "transmission_weight",
-    default_roughness=0.3,
-)
-# fmt: on
-
 _BY_NAME: Final = {
-    "UsdPreviewSurface": _PREVIEW,
-    "standard_surface": _STANDARD,
-    "gltf_pbr": _GLTF,
-    "open_pbr_surface": _OPEN,
+    row.shader: row
+    for row in read_csv(Path(__file__).with_name("surface_shaders.csv"), SurfaceWords)
 }
 _CONTEXTS: Final = ("", "mtlx")  # render contexts in order of preference, the shared one first
 
