@@ -8,13 +8,13 @@ from __future__ import annotations
 
 import re
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 from typing import Final
 
 from pbrs_farm.core.errors import BadHouse, BadInput
-from pbrs_farm.core.house import Note
-from pbrs_farm.core.shown_text import MAX_MESSAGE, MAX_PLACE, shown
+from pbrs_farm.core.shown_text import MAX_PLACE, shown
+from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.source_files import ZipResources
 from pbrs_farm.read.sweethome3d.home_file.home_xml import DoorFrame, Paint, PlanLight, PlanPiece
 from pbrs_farm.read.sweethome3d.home_file.parse_home import FULL_CUT_OUT
@@ -109,17 +109,6 @@ class Library:
     sha256: str
 
 
-@dataclass(slots=True)
-class LibraryNotes:
-    """Faults of the libraries, each once."""
-
-    found: dict[Note, None] = field(default_factory=dict)
-
-    def add(self, kind: str, place: str, text: str) -> None:
-        """Remember a fault of a library; the rest of it is read on, even if reading is strict."""
-        self.found[Note(kind, shown(place, MAX_PLACE), shown(text, MAX_MESSAGE))] = None
-
-
 def opened_archive(path: Path) -> tuple[ZipResources, str]:
     """The archive at path, its entries unread, and its sha256; BadInput without it, BadHouse for damage."""
     try:
@@ -141,7 +130,7 @@ class OpenedLibrary:
     properties: dict[str, str]
 
 
-def opened_library(path: Path, catalogue: str, notes: LibraryNotes) -> OpenedLibrary | None:
+def opened_library(path: Path, catalogue: str, notes: Notes) -> OpenedLibrary | None:
     """The library at path; None, with a note, where it is damaged or holds no such catalogue.
 
     catalogue: the property file in the archive. Raises BadInput for a path that does not exist.
@@ -158,9 +147,7 @@ def opened_library(path: Path, catalogue: str, notes: LibraryNotes) -> OpenedLib
     return OpenedLibrary(contents, sha256, parse_properties(data))
 
 
-def furniture_library(
-    path: Path, notes: LibraryNotes, catalogue: str = FURNITURE
-) -> Library | None:
+def furniture_library(path: Path, notes: Notes, catalogue: str = FURNITURE) -> Library | None:
     """The library in a .sh3f (or the program's jar); None and BadInput as opened_library.
 
     notes: receives omissions and their reasons. Entries without a model in the archive are left out
@@ -195,7 +182,7 @@ def licence_of(properties: Mapping[str, str]) -> str:
     return shown(text, MAX_PLACE)
 
 
-def _entry(row: dict[str, str], library: str, notes: LibraryNotes) -> Entry | None:
+def _entry(row: dict[str, str], library: str, notes: Notes) -> Entry | None:
     inner = row.get("id") or row.get("name", "")
     inner = inner.partition("#")[2] or inner
     place = f"{library}#{inner}"

@@ -17,7 +17,7 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.frames import rotation_y, transform_points
 from pbrs_farm.core.house import Surface, Texture
 from pbrs_farm.core.mesh import face_areas, triangle_corners
-from pbrs_farm.read.catalogue.library_files import Entry, LibraryNotes
+from pbrs_farm.read.catalogue.library_files import Entry
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.source_files import Resources
 from pbrs_farm.read.sweethome3d.home_file.home_xml import PlanPiece
@@ -44,7 +44,7 @@ _JPEG_QUALITY: Final = 92
 
 
 def library_shape(
-    entry: Entry, place: Place, turn_deg: float, contents: Resources, notes: LibraryNotes
+    entry: Entry, place: Place, turn_deg: float, contents: Resources, notes: Notes
 ) -> Shape | None:
     """The shape of a library's piece, turned about the vertical; None, with a note, for an unusable model."""
     shape_notes = Notes(entry.id, strict=False)
@@ -84,7 +84,7 @@ def library_shape(
     return fitted_shape(shape, place, entry.id, notes)
 
 
-def fitted_shape(shape: Shape, place: Place, piece_id: str, notes: LibraryNotes) -> Shape | None:
+def fitted_shape(shape: Shape, place: Place, piece_id: str, notes: Notes) -> Shape | None:
     """A lighter shape with smaller pictures; None, with a note, if TOO_MANY triangles remain."""
     longest = float(np.ptp(shape.bounds, axis=0).max())
     most, coarsest = SMALL if place is Place.SURFACE else MEDIUM if longest < MEDIUM_M else LARGE

@@ -25,10 +25,10 @@ from pbrs_farm.core.errors import BadInput, PbrsError
 from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import House, ItemKind, Note
 from pbrs_farm.core.recipe import ReadFields
-from pbrs_farm.read.catalogue.library_files import LibraryNotes
 from pbrs_farm.read.catalogue.library_shapes import MAX_TRIANGLES, fitted_shape
 from pbrs_farm.read.catalogue.model_tables import ModelRow, ModelTable, Size, model_table
 from pbrs_farm.read.catalogue.piece_groups import GroupRule, group_rule
+from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.objects.model_folders import ObjectModel, find_models
 from pbrs_farm.read.objects.single_object import read_object
 from pbrs_farm.regular_files import digest_of_regular, open_regular
@@ -65,7 +65,7 @@ class _Indexed:
 
 
 def model_folder(
-    path: Path, notes: LibraryNotes, store: Path | None = None
+    path: Path, notes: Notes, store: Path | None = None
 ) -> tuple[str, tuple[FolderPiece, ...]]:
     """(digest of all its files, the pieces) of a folder; a rejected model becomes a note.
 
@@ -76,9 +76,9 @@ def model_folder(
     stored = store / f"index-{_key_of_folder(path, files)}.json" if store is not None else None
     index = _read_index(stored) if stored is not None else None
     if index is None:
-        own_notes = LibraryNotes()
+        own_notes = Notes("", strict=False)
         pieces = tuple(index_models(path, own_notes))
-        index = _digest_of_folder(files), pieces, tuple(own_notes.found)
+        index = _digest_of_folder(files), pieces, own_notes.all()
         if stored is not None:
             _write_index(stored, *index)
     digest, pieces, noted = index
@@ -87,7 +87,7 @@ def model_folder(
     return digest, tuple(_piece_of_model(path, piece, notes) for piece in pieces)
 
 
-def index_models(path: Path, notes: LibraryNotes) -> list[_Indexed]:
+def index_models(path: Path, notes: Notes) -> list[_Indexed]:
     table = model_table(path, notes)
     entries = []
     for model in _models(path, table):
@@ -111,7 +111,7 @@ def _models(path: Path, table: ModelTable) -> list[ObjectModel]:
     return models
 
 
-def _indexed(model: ObjectModel, file: str, row: ModelRow, notes: LibraryNotes) -> _Indexed | None:
+def _indexed(model: ObjectModel, file: str, row: ModelRow, notes: Notes) -> _Indexed | None:
     place = f"{model.root.name}#{file.rpartition('.')[0]}"
     name = row.name or model.name.replace("_", " ")
     try:
@@ -139,7 +139,7 @@ def _indexed(model: ObjectModel, file: str, row: ModelRow, notes: LibraryNotes) 
 
 
 def _find_rule_and_size(
-    name: str, row: ModelRow, category: str, size: Size, place: str, notes: LibraryNotes
+    name: str, row: ModelRow, category: str, size: Size, place: str, notes: Notes
 ) -> tuple[GroupRule | None, Size]:
     """(the rule, the size in metres) of a piece; None, with a note, where none has that size."""
     if row.group and row.size is not None:
@@ -276,7 +276,7 @@ def _read_index(file: Path) -> tuple[str, tuple[_Indexed, ...], tuple[Note, ...]
         return None
 
 
-def _piece_of_model(path: Path, entry: _Indexed, notes: LibraryNotes) -> FolderPiece:
+def _piece_of_model(path: Path, entry: _Indexed, notes: Notes) -> FolderPiece:
     piece = Piece(
         id=f"{path.name}#{entry.file.rpartition('.')[0]}",
         name=entry.name,
@@ -294,7 +294,7 @@ def _piece_of_model(path: Path, entry: _Indexed, notes: LibraryNotes) -> FolderP
     return piece, partial(_shape, model, piece, entry.quarters, notes)
 
 
-def _shape(model: ObjectModel, piece: Piece, quarters: int, notes: LibraryNotes) -> Shape | None:
+def _shape(model: ObjectModel, piece: Piece, quarters: int, notes: Notes) -> Shape | None:
     width, depth, height = _turn_size(piece.size, quarters)
     try:
         house = read_object(replace(model, size_m=(width, height, depth)), _FIELDS)

@@ -19,21 +19,15 @@ from typing import Any, Final
 
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadHouse, BadInput
-from pbrs_farm.read.catalogue.library_files import LibraryNotes
-from pbrs_farm.read.common.given_classes import given_class, hssd_rows
+from pbrs_farm.read.common.given_classes import HSSD_TABLES, given_class, hssd_rows
 from pbrs_farm.read.common.json_values import bounded_json
+from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.regular_files import MAX_TEXT_BYTES, fault_of, read_regular, text_from_bytes
 
 Size = tuple[float, float, float]
 
 TABLE: Final = "catalogue.csv"
 _INFO: Final = ("model_info.json", "3D-FUTURE-model/model_info.json")
-_OBJECTS: Final = (
-    "objects.csv",
-    "semantics/objects.csv",
-    "metadata/objects.csv",
-    "semantics/hssd-hab_semantics_objects.csv",
-)
 _ANNOTATIONS: Final = ("annotations.json", "annotations.json.gz")
 _MAX_BYTES: Final = 256_000_000  # of a table, unpacked
 _MOST_M: Final = 50.0
@@ -61,7 +55,7 @@ class ModelTable:
     is_whole: bool = False
 
 
-def model_table(path: Path, notes: LibraryNotes) -> ModelTable:
+def model_table(path: Path, notes: Notes) -> ModelTable:
     """The table of a folder of models, empty if there is none; faults become notes.
 
     Searched in turn: catalogue.csv, 3D-FUTURE's, HSSD's, objathor's, and last a single CSV file that
@@ -70,7 +64,7 @@ def model_table(path: Path, notes: LibraryNotes) -> ModelTable:
     for names, read in (
         ((TABLE,), _own),
         (_INFO, _future),
-        (_OBJECTS, _hssd),
+        (HSSD_TABLES, _hssd),
         (_ANNOTATIONS, _objathor),
     ):
         for name in names:
@@ -82,7 +76,7 @@ def model_table(path: Path, notes: LibraryNotes) -> ModelTable:
     )
 
 
-def _read_model_table(path: Path, name: str, read: Any, notes: LibraryNotes) -> ModelTable:
+def _read_model_table(path: Path, name: str, read: Any, notes: Notes) -> ModelTable:
     try:
         table: ModelTable = read(path, name, notes)
     except (BadHouse, BadInput, OSError, ValueError, KeyError, csv.Error, EOFError) as error:
@@ -107,7 +101,7 @@ def _names_files(file: Path) -> bool:
         return False
 
 
-def _own(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
+def _own(path: Path, name: str, notes: Notes) -> ModelTable:
     text = text_from_bytes(read_regular(path / name, MAX_TEXT_BYTES))
     rows = list(csv.DictReader(text.splitlines()))
     if rows and "file" not in rows[0]:
@@ -163,7 +157,7 @@ def _quarters(text: str) -> int:
     return (_AXES["+z" if z > 0 else "-z"]) if abs(z) >= abs(x) else _AXES["+x" if x > 0 else "-x"]
 
 
-def _future(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
+def _future(path: Path, name: str, notes: Notes) -> ModelTable:
     """3D-FUTURE: a list of model_id, super-category, category; raw_model.obj in metres, front to +z."""
     rows = bounded_json(_data(path / name), name)
     folder = name.rpartition("/")[0]
@@ -179,7 +173,7 @@ def _future(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
     return ModelTable(models, is_whole=True)
 
 
-def _hssd(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
+def _hssd(path: Path, name: str, notes: Notes) -> ModelTable:
     """HSSD: an id a row and its category; models in objects/, by the id's first character."""
     models = {}
     for uid, category, _size in hssd_rows(_data(path / name)):
@@ -202,7 +196,7 @@ def _front_of_config(file: Path) -> int:
         return 0
 
 
-def _objathor(path: Path, name: str, notes: LibraryNotes) -> ModelTable:
+def _objathor(path: Path, name: str, notes: Notes) -> ModelTable:
     """objathor: id -> annotation with its category; GLB beside it or in assets/. Pickles are refused."""
     rows = bounded_json(_data(path / name), name)
     if not isinstance(rows, dict):

@@ -28,7 +28,6 @@ from pbrs_farm.read.catalogue.library_files import (
     JAR_FURNITURE,
     Entry,
     Library,
-    LibraryNotes,
     furniture_library,
 )
 from pbrs_farm.read.catalogue.library_shapes import library_shape
@@ -46,6 +45,7 @@ from pbrs_farm.read.catalogue.surface_pictures import (
     pictures_of_models,
     texture_library,
 )
+from pbrs_farm.read.common.notes import Notes
 
 FORMAT: Final = 1
 
@@ -158,7 +158,7 @@ def catalogue_from(
     Damaged entries become notes; BadInput for a path that does not exist or is no library, and for a
     library without any usable piece, unless may_be_empty.
     """
-    notes = LibraryNotes()
+    notes = Notes("", strict=False)
     libraries_read = []
     if jar is not None:
         libraries_read.append(_read_furniture_library(jar, notes, JAR_FURNITURE))
@@ -180,7 +180,7 @@ def catalogue_from(
         load=lambda piece: loaders[piece.id]() if piece.id in loaders else None,
         digest=keys.digest({"version": VERSION, "libraries": [f.sha256 for f in usable]}),
         pictures=tuple({p.texture.id: p for f in usable for p in f.pictures}.values()),
-        notes=tuple(notes.found),
+        notes=notes.all(),
         own=frozenset(piece.id for f in users if f is not None for piece, _ in f.pieces),
     )
 
@@ -194,13 +194,11 @@ def _load_through_store(
     return lambda: shapes.shape(key, load)
 
 
-def _given(
-    path: Path, notes: LibraryNotes, store: Path | None, *, may_be_empty: bool
-) -> Found | None:
+def _given(path: Path, notes: Notes, store: Path | None, *, may_be_empty: bool) -> Found | None:
     if not path.exists():
         raise BadInput(path, "", "no such file or folder", hint="of --catalogue")
     library: Found | None
-    n_before = len(notes.found)
+    n_before = len(notes.all())
     if path.is_dir():
         library = _read_folder(path, notes, store)
     elif path.suffix.lower() == ".sh3t":
@@ -211,12 +209,12 @@ def _given(
         hint = "supported: .sh3f, .sh3t, a folder of OBJ and GLB, a folder of pictures"
         raise BadInput(path, "", "is not a catalogue", hint=hint)
     if not may_be_empty and (library is None or not (library.pieces or library.pictures)):
-        why = next((n.text for n in [*notes.found][n_before:]), "")
+        why = next((n.text for n in notes.all()[n_before:]), "")
         raise BadInput(path, "", "no usable piece or picture", hint=why)
     return library
 
 
-def _read_folder(path: Path, notes: LibraryNotes, store: Path | None) -> Found:
+def _read_folder(path: Path, notes: Notes, store: Path | None) -> Found:
     """Models; pictures for the walls where there are no models."""
     try:
         sha256, pieces = model_folder(path, notes, store)
@@ -228,12 +226,12 @@ def _read_folder(path: Path, notes: LibraryNotes, store: Path | None) -> Found:
     return Found(sha256, pieces)
 
 
-def _textures(path: Path, notes: LibraryNotes, catalogue: str) -> Found | None:
+def _textures(path: Path, notes: Notes, catalogue: str) -> Found | None:
     library = texture_library(path, notes, catalogue)
     return Found(library[0], pictures=library[1]) if library else None
 
 
-def _read_furniture_library(path: Path, notes: LibraryNotes, catalogue: str) -> Found | None:
+def _read_furniture_library(path: Path, notes: Notes, catalogue: str) -> Found | None:
     library = furniture_library(path, notes, catalogue)
     if library is None:
         return None
@@ -260,7 +258,7 @@ def _rule_of_entry(entry: Entry, group: str) -> GroupRule | None:
 
 
 def _piece_of_entry(
-    library: Library, entry: Entry, rule: GroupRule, verdict: PieceVerdict, notes: LibraryNotes
+    library: Library, entry: Entry, rule: GroupRule, verdict: PieceVerdict, notes: Notes
 ) -> tuple[Piece, Loader]:
     # Swap width and depth of a piece turned by a quarter.
     width, depth, height = entry.piece.size

@@ -23,7 +23,6 @@ from pbrs_farm.core.catalogue import PRINTS, Picture
 from pbrs_farm.core.errors import BadHouse, PbrsError
 from pbrs_farm.core.house import Texture
 from pbrs_farm.read.catalogue.library_files import (
-    LibraryNotes,
     OpenedLibrary,
     licence_of,
     numbered_entries,
@@ -32,6 +31,7 @@ from pbrs_farm.read.catalogue.library_files import (
 from pbrs_farm.read.catalogue.library_shapes import small_texture
 from pbrs_farm.read.common.furniture_classes import plain, rows_of_table
 from pbrs_farm.read.common.material_library import texture_from_bytes
+from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.source_files import Resources
 from pbrs_farm.regular_files import read_regular
 
@@ -57,7 +57,7 @@ class _Seen:
 
 
 def pictures_of_models(
-    library: str, contents: Resources, licence: str, notes: LibraryNotes
+    library: str, contents: Resources, licence: str, notes: Notes
 ) -> tuple[Picture, ...]:
     """The surface pictures that a library of the packages holds among its models."""
     pictures = []
@@ -70,7 +70,7 @@ def pictures_of_models(
 
 
 def texture_library(
-    path: Path, notes: LibraryNotes, catalogue: str = TEXTURES
+    path: Path, notes: Notes, catalogue: str = TEXTURES
 ) -> tuple[str, tuple[Picture, ...]] | None:
     """(sha256, pictures) of a .sh3t; None, with a note, if it is damaged.
 
@@ -86,9 +86,7 @@ def texture_library(
     return opened.sha256, pictures
 
 
-def _pictures_of_library(
-    opened: OpenedLibrary, library: str, notes: LibraryNotes
-) -> Iterator[Picture]:
+def _pictures_of_library(opened: OpenedLibrary, library: str, notes: Notes) -> Iterator[Picture]:
     licence, count = licence_of(opened.properties), Counter[str]()
     for row in numbered_entries(opened.properties):
         group = surface_group(row.get("name", ""), row.get("category", ""))
@@ -118,12 +116,7 @@ def surface_group(name: str, category: str) -> str:
 
 
 def _picture_of_row(
-    row: dict[str, str],
-    group: str,
-    contents: Resources,
-    library: str,
-    licence: str,
-    notes: LibraryNotes,
+    row: dict[str, str], group: str, contents: Resources, library: str, licence: str, notes: Notes
 ) -> Picture | None:
     place = f"{library}#{row.get('id', row.get('name', ''))}"
     try:
@@ -140,9 +133,7 @@ def _picture_of_row(
     return Picture(texture, group, (width, height), row.get("creator", library), licence)
 
 
-def _read_texture(
-    contents: Resources, image: str, place: str, notes: LibraryNotes
-) -> Texture | None:
+def _read_texture(contents: Resources, image: str, place: str, notes: Notes) -> Texture | None:
     try:
         data = contents.read(image)
         if data is None:
@@ -170,7 +161,7 @@ def _seen_pictures() -> dict[str, list[_Seen]]:
     return rows_of_library
 
 
-def picture_folder(path: Path, notes: LibraryNotes) -> tuple[str, tuple[Picture, ...]]:
+def picture_folder(path: Path, notes: Notes) -> tuple[str, tuple[Picture, ...]]:
     """(digest, upright pictures of the group `prints`) of a folder's JPEG and PNG files; faults become notes."""
     digest, pictures = hashlib.sha256(), []
     files = sorted(p for p in path.rglob("*") if p.suffix.lower() in _SUFFIXES)

@@ -58,6 +58,15 @@ def class_by_words(*names: str) -> GivenClass | None:
     return None
 
 
+HSSD_TABLES: Final = (
+    "objects.csv",
+    "semantics/objects.csv",
+    "metadata/objects.csv",
+    "semantics/hssd-hab_semantics_objects.csv",
+)
+"""Where HSSD's table of categories may be in a folder of models."""
+
+
 def hssd_rows(data: bytes) -> Iterator[tuple[str, str, str]]:
     """(id, category, size as written) of HSSD's objects.csv: without a head the id is first, the category 15th."""
     rows = csv.reader(io.StringIO(text_from_bytes(data, "replace")))

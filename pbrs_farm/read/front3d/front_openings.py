@@ -71,19 +71,21 @@ def _openings_by_name(house: FrontFile) -> list[_NamedOpening]:
         low, high = mesh.points.min(0), mesh.points.max(0)
         if mesh.kind not in HOLE_TYPES or high[1] - low[1] < _FLAT_M:
             continue
-        kind: Literal["door", "window", "open"] = "window"
-        if mesh.kind in ("Door", "Hole"):
-            kind = "door" if mesh.kind == "Door" else "open"
         door = doors.get(mesh.uid)
-        box = None if mesh.kind == "BayWindow" else np.array([low, high])
-        if door is not None:
-            named_openings.append(
-                _NamedOpening(
-                    (low + high) / 2, "door", mesh.kind, 0, door.is_entry, door.hinge, box=box
-                )
+        kind: Literal["door", "window", "open"] = "window"
+        if door is not None or mesh.kind in ("Door", "Hole"):
+            kind = "door" if door is not None or mesh.kind == "Door" else "open"
+        named_openings.append(
+            _NamedOpening(
+                (low + high) / 2,
+                kind,
+                mesh.kind,
+                2 if door is None else 0,
+                door is not None and door.is_entry,
+                "" if door is None else door.hinge,
+                box=None if mesh.kind == "BayWindow" else np.array([low, high]),
             )
-        else:
-            named_openings.append(_NamedOpening((low + high) / 2, kind, mesh.kind, 2, box=box))
+        )
     for piece in house.pieces:
         if not is_opening(piece) and piece.uid not in doors:
             continue

@@ -20,7 +20,13 @@ from pbrs_farm.core.errors import BadHouse
 from pbrs_farm.core.house import Item, ItemKind, Surface
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.common.furniture_classes import rows_of_table
-from pbrs_farm.read.common.given_classes import GivenClass, box_only_item, class_by_words, hssd_rows
+from pbrs_farm.read.common.given_classes import (
+    HSSD_TABLES,
+    GivenClass,
+    box_only_item,
+    class_by_words,
+    hssd_rows,
+)
 from pbrs_farm.read.common.json_values import NAME
 from pbrs_farm.read.common.material_library import MaterialLibrary
 from pbrs_farm.read.common.notes import HARMLESS, Notes
@@ -34,12 +40,6 @@ from pbrs_farm.read.mesh.obj import Mesh
 from pbrs_farm.read.scenestate.scene_document import PlacedModel
 from pbrs_farm.regular_files import MAX_SCENE_BYTES
 
-_TABLES: Final = (
-    "objects.csv",
-    "semantics/objects.csv",
-    "metadata/objects.csv",
-    "semantics/hssd-hab_semantics_objects.csv",
-)
 _MAX_TABLE_BYTES: Final = 64_000_000
 _BESIDE: Final = ("", "..", "../..")  # where models and tables lie when no folder is named
 
@@ -65,11 +65,6 @@ def names_of_model(model: str) -> Iterator[str]:
         yield f"{folder}{model}.glb"
         yield f"{folder}{model[0]}/{model}.glb"
         yield f"{folder}{model}/{model}.glb"
-
-
-def table_names() -> tuple[str, ...]:
-    """Where the table of categories may lie in a folder of models."""
-    return _TABLES
 
 
 class SceneModels:
@@ -204,7 +199,7 @@ def _usual_sizes() -> dict[str, tuple[float, float, float]]:
 def _find_objects_csv(roots: list[RootFolder]) -> dict[str, _Row]:
     """The rows of objects.csv by id."""
     for root in roots:
-        for name in _TABLES:
+        for name in HSSD_TABLES:
             try:
                 data = root.read(name, max_bytes=_MAX_TABLE_BYTES)
             except BadHouse:

@@ -28,6 +28,7 @@ from pbrs_farm.read.common.arch_elements import (
 )
 from pbrs_farm.read.common.doors_and_windows import Hole, merge_holes
 from pbrs_farm.read.common.format import GivenFile, data_of
+from pbrs_farm.read.common.given_classes import HSSD_TABLES
 from pbrs_farm.read.common.house_builder import HouseBuilder, structure_item
 from pbrs_farm.read.common.json_values import MAX_JSON_BYTES
 from pbrs_farm.read.common.notes import Notes
@@ -41,12 +42,7 @@ from pbrs_farm.read.scenestate.scene_document import (
     SceneElement,
     scene_document,
 )
-from pbrs_farm.read.scenestate.scene_models import (
-    SceneModels,
-    names_of_model,
-    roots_of,
-    table_names,
-)
+from pbrs_farm.read.scenestate.scene_models import SceneModels, names_of_model, roots_of
 from pbrs_farm.read.scenestate.scene_walls import StandingWall, standing_walls
 
 MAX_WALLS, MAX_SLABS, MAX_HOLES = 3_000, 1_500, 2_000
@@ -63,7 +59,7 @@ def companions_of_scenestate(given: GivenFile, files: SourceFiles) -> str:
     _, data = data_of(given, MAX_JSON_BYTES)
     document = scene_document(data, path.name, Notes(path.name, strict=False))
     ids = {o.model for o in document.objects}
-    names = [*table_names(), *(n for model in sorted(ids) for n in names_of_model(model))]
+    names = [*HSSD_TABLES, *(n for model in sorted(ids) for n in names_of_model(model))]
     digests = [files.digest(root, names) for root in roots_of(path, models)]
     return keys.digest(*digests) if any(digests) else ""
 
