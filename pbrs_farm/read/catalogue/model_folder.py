@@ -10,12 +10,13 @@ import hashlib
 import json
 import struct
 from contextlib import suppress
-from dataclasses import asdict, dataclass, replace
+from dataclasses import dataclass, replace
 from functools import partial
 from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
+from pydantic import TypeAdapter
 
 from pbrs_farm.assets.debian import write_whole
 from pbrs_farm.core import keys
@@ -23,7 +24,7 @@ from pbrs_farm.core.catalogue import Piece, Place, Shape
 from pbrs_farm.core.classes import NYU40_NAMES
 from pbrs_farm.core.errors import BadInput, PbrsError
 from pbrs_farm.core.frames import rotation_y
-from pbrs_farm.core.house import House, ItemKind, Note
+from pbrs_farm.core.house import House, Note
 from pbrs_farm.core.recipe import ReadFields
 from pbrs_farm.read.catalogue.library_shapes import MAX_TRIANGLES, fitted_shape
 from pbrs_farm.read.catalogue.model_tables import ModelRow, ModelTable, Size, model_table
@@ -53,15 +54,12 @@ class _Indexed:
     """Stored index entry of a model that is a piece."""
 
     file: str  # below the folder
-    name: str
-    group: str
-    place: str
-    nyu40: int
-    kind: str
-    size: Size  # of the piece, turned to its front
-    quarters: int
-    creator: str
-    licence: str
+    quarters: int  # turns by 90 degrees of the model to the piece's front
+    piece: Piece
+
+
+_Index = tuple[str, tuple[_Indexed, ...], tuple[Note, ...]]  # digest, pieces, notes
+_INDEX: Final = TypeAdapter(_Index)
 
 
 def model_folder(
@@ -80,7 +78,9 @@ def model_folder(
         pieces = tuple(index_models(path, own_notes))
         index = _digest_of_folder(files), pieces, own_notes.all()
         if stored is not None:
-            _write_index(stored, *index)
+            with suppress(OSError, ValueError):
+                stored.parent.mkdir(parents=True, exist_ok=True)
+                write_whole(stored, _INDEX.dump_json(index))
     digest, pieces, noted = index
     for note in noted:
         notes.add(note.kind, note.place, note.text)
@@ -124,18 +124,19 @@ def _indexed(model: ObjectModel, file: str, row: ModelRow, notes: Notes) -> _Ind
     )
     if rule is None:
         return None
-    return _Indexed(
-        file,
-        name,
-        rule.group,
-        rule.place.value,
-        rule.nyu40,
-        rule.kind.value,
-        size,
-        row.quarters,
-        row.creator,
-        row.licence,
+    piece = Piece(
+        id=place,
+        name=name,
+        group=rule.group,
+        place=rule.place,
+        nyu40=rule.nyu40,
+        size=size,
+        kind=rule.kind,
+        library=model.root.name,
+        creator=row.creator,
+        licence=row.licence,
     )
+    return _Indexed(file, row.quarters, piece)
 
 
 def _find_rule_and_size(
@@ -256,41 +257,17 @@ def _digest_of_folder(files: dict[str, Path]) -> str:
     return digest.hexdigest()
 
 
-def _write_index(
-    file: Path, digest: str, pieces: tuple[_Indexed, ...], notes: tuple[Note, ...]
-) -> None:
-    noted = [(n.kind, n.place, n.text) for n in notes]
-    row = {"digest": digest, "pieces": [asdict(piece) for piece in pieces], "notes": noted}
-    with suppress(OSError):
-        file.parent.mkdir(parents=True, exist_ok=True)
-        write_whole(file, json.dumps(row).encode())
-
-
-def _read_index(file: Path) -> tuple[str, tuple[_Indexed, ...], tuple[Note, ...]] | None:
-    """Read the file of _write_index; None if it is missing or damaged."""
+def _read_index(file: Path) -> _Index | None:
+    """The stored index of a folder; None if it is missing or damaged."""
     try:
-        row = json.loads(file.read_bytes())
-        pieces = tuple(_Indexed(**{**p, "size": tuple(p["size"])}) for p in row["pieces"])
-        return str(row["digest"]), pieces, tuple(Note(*note) for note in row["notes"])
-    except (OSError, ValueError, KeyError, TypeError):
+        return _INDEX.validate_json(file.read_bytes())
+    except (OSError, ValueError):
         return None
 
 
 def _piece_of_model(path: Path, entry: _Indexed, notes: Notes) -> FolderPiece:
-    piece = Piece(
-        id=f"{path.name}#{entry.file.rpartition('.')[0]}",
-        name=entry.name,
-        group=entry.group,
-        place=Place(entry.place),
-        nyu40=entry.nyu40,
-        size=entry.size,
-        kind=ItemKind(entry.kind),
-        library=path.name,
-        creator=entry.creator,
-        licence=entry.licence,
-    )
-    file = path / entry.file
-    model = ObjectModel(keys.slug(file.stem), entry.name, entry.group, entry.nyu40, file, path)
+    piece, file = entry.piece, path / entry.file
+    model = ObjectModel(keys.slug(file.stem), piece.name, piece.group, piece.nyu40, file, path)
     return piece, partial(_shape, model, piece, entry.quarters, notes)
 
 
