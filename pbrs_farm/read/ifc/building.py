@@ -55,8 +55,14 @@ from pbrs_farm.read.ifc.doors_and_windows import (
     tags_of_name,
     voids_of_walls,
 )
-from pbrs_farm.read.ifc.meshes import ProductMesh, Style, Whole, meshes_of_products, with_wholes
-from pbrs_farm.read.ifc.model_file import model_of
+from pbrs_farm.read.ifc.model_file import (
+    ProductMesh,
+    Style,
+    Whole,
+    meshes_of_products,
+    model_of,
+    with_wholes,
+)
 from pbrs_farm.read.mesh.obj import Mesh
 
 """(x, y, z) with z up -> (x, z, -y) with y up."""

@@ -16,7 +16,7 @@ from pbrs_farm.read.common.doors_and_windows import Hole
 from pbrs_farm.read.common.furniture_classes import words_of_list
 from pbrs_farm.read.common.name_classes import class_of_node_name
 from pbrs_farm.read.common.openings import Void
-from pbrs_farm.read.ifc.meshes import ProductMesh
+from pbrs_farm.read.ifc.model_file import ProductMesh
 
 _THIN_M: Final = 0.045  # maximum thickness of a window part that may be glass, metres
 _THRESHOLD_M: Final = 0.3  # above the storey: a door begins lower

@@ -21,7 +21,7 @@ from pbrs_farm.read.common.format import GivenFile, data_of
 from pbrs_farm.read.common.name_classes import class_of_node_name
 from pbrs_farm.read.common.notes import Notes
 from pbrs_farm.read.common.source_files import SourceFiles
-from pbrs_farm.read.gltf.obj_document import files_of_obj, gltf_of_groups, materials_of_obj
+from pbrs_farm.read.gltf.assembly import files_of_obj, gltf_of_groups, materials_of_obj
 from pbrs_farm.read.gltf.scene import Beside, house_of_gltf
 from pbrs_farm.read.mesh.obj import Mesh, parse_obj
 from pbrs_farm.regular_files import MAX_SCENE_BYTES

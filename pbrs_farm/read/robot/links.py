@@ -13,8 +13,7 @@ from pbrs_farm.core.joints import JointKind
 from pbrs_farm.core.mesh import triangle_corners, unit_normals
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
-from pbrs_farm.read.gltf.assembly import Assembly, files_of_asset
-from pbrs_farm.read.gltf.obj_document import gltf_of_groups
+from pbrs_farm.read.gltf.assembly import Assembly, files_of_asset, gltf_of_groups
 from pbrs_farm.read.gltf.scene_writer import KEY, joint_row
 from pbrs_farm.read.mesh.mtl import ObjMaterial
 from pbrs_farm.read.mesh.obj import Mesh
