@@ -214,15 +214,17 @@ class Assembly:
         lights += own_lights if isinstance(own_lights, list) else []
 
     def place(self, roots: list[int], matrix: F64, name: str, extras: dict[str, Any]) -> None:
-        """Put an asset's roots below a new node."""
-        node = {
-            "name": name,
-            "matrix": matrix.T.reshape(-1).tolist(),
-            "children": roots,
-            "extras": extras,
-        }
-        self.roots.append(len(self.document["nodes"]))
-        self.document["nodes"].append(node)
+        """Put an asset's roots below a new node of the scene."""
+        self.roots.append(self.node(roots, matrix, name, extras))
+
+    def node(
+        self, children: list[int], matrix: F64, name: str = "", extras: dict[str, Any] | None = None
+    ) -> int:
+        """The number of a new node, still without a parent, that moves some nodes."""
+        row = {"name": name, "matrix": matrix_row(matrix), "children": children}
+        nodes = self.document.setdefault("nodes", [])
+        nodes.append(row | {"extras": extras or {}})
+        return len(nodes) - 1
 
     def light_node(self, row: dict[str, Any], position: F64, name: str) -> int:
         """The number of a new node, still without a parent, with a light of KHR_lights_punctual."""

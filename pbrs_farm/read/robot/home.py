@@ -108,12 +108,12 @@ class _Scene:
             if light.link in node_of:
                 nodes[node_of[light.link]]["children"].append(node)
             else:
-                self.built.roots.append(self._turned([node], model.world_from_model))
+                self.built.place([node], Y_UP_FROM_Z_UP @ model.world_from_model, "", {})
         if not node_of:
             return
         self._name_items(robot, model.name, node_of)
         roots = roots_of_robot(robot, node_of)
-        self.built.roots.append(self._turned(roots, model.world_from_model))
+        self.built.place(roots, Y_UP_FROM_Z_UP @ model.world_from_model, "", {})
 
     def add_ground(self) -> None:
         """Add a floor below the walls, else below everything, if a plane is the only floor."""
@@ -126,11 +126,8 @@ class _Scene:
         middle[:3, 3] = [(low[0] + high[0]) / 2, self._ground, (low[2] + high[2]) / 2]
         size = (float(high[0] - low[0]), _GROUND_M, float(high[2] - low[2]))
         middle[1, 3] -= _GROUND_M / 2
-        row = {"name": "ground", "matrix": middle.T.ravel().tolist(), "extras": {"class": "floor"}}
-        nodes = self.built.document["nodes"]
-        row["children"] = solid_roots(self.built, Solid("box", size, GREY))
-        self.built.roots.append(len(nodes))
-        nodes.append(row)
+        roots = solid_roots(self.built, Solid("box", size, GREY))
+        self.built.place(roots, middle, "ground", {"class": "floor"})
 
     def _boxes(self) -> Iterator[tuple[bool, F64]]:
         """Whether a placed mesh is a wall's, and (2, 3) its box, y up."""
@@ -180,12 +177,6 @@ class _Scene:
             return added and added[0]
 
         return roots_of
-
-    def _turned(self, roots: list[int], world_from_model: F64) -> int:
-        matrix = Y_UP_FROM_Z_UP @ world_from_model
-        nodes = self.built.document["nodes"]
-        nodes.append({"name": "", "matrix": matrix.T.ravel().tolist(), "children": roots})
-        return len(nodes) - 1
 
     def _name_items(self, robot: Robot, model: str, node_of: dict[str, int]) -> None:
         """Make items of the uppermost links with a shape or a moving part; the others are groups."""

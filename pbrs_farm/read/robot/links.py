@@ -14,7 +14,7 @@ from pbrs_farm.core.mesh import triangle_corners, unit_normals
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.read.common.source_files import RootFolder, SourceFiles
 from pbrs_farm.read.gltf.assembly import Assembly, files_of_asset, gltf_of_groups
-from pbrs_farm.read.gltf.scene_writer import KEY, joint_row
+from pbrs_farm.read.gltf.scene_writer import KEY, joint_row, matrix_row
 from pbrs_farm.read.mesh.mtl import ObjMaterial
 from pbrs_farm.read.mesh.obj import Mesh
 from pbrs_farm.read.mesh.shape import ball, cylinder_profile, shape_of_surface, turned
@@ -51,14 +51,13 @@ def placed_links(
             value = values.get(link.joint.name, 0.0)
             if link.joint.kind is JointKind.PRISMATIC:
                 value /= scale
-            node["matrix"] = link.joint.parent_from_link(value).T.ravel().tolist()
+            node["matrix"] = matrix_row(link.joint.parent_from_link(value))
             if link.joint.kind is not None:
                 limits = link.joint.lower, link.joint.upper
                 axis, kind = link.joint.axis, link.joint.kind
                 node["extras"] = {KEY: joint_row(link.name, kind, (0, 0, 0), axis, limits, value)}
         for models, matrix in shown.get(link.name, []):
-            node["children"].append(len(nodes))
-            nodes.append({"name": "", "matrix": matrix.T.ravel().tolist(), "children": models})
+            node["children"].append(built.node(models, matrix))
         node_of[link.name] = len(nodes)
         nodes.append(node)
         if link.parent is not None:
