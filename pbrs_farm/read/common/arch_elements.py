@@ -33,12 +33,7 @@ from pbrs_farm.read.mesh.mtl import ObjMaterial
 WALL_DEPTH_M: Final = 0.10
 SLAB_DEPTH_M: Final = 0.05
 _EDGE: Final = ObjMaterial("edge", (0.50196, 0.50196, 0.50196))  # sRGB 128; not given in files
-KIND_OF_ELEMENT: Final = {
-    "Floor": ItemKind.FLOOR,
-    "Ceiling": ItemKind.CEILING,
-    "Ground": ItemKind.GROUND,
-    "Wall": ItemKind.WALL,
-}
+KIND_OF_ELEMENT: Final = {kind.value.title(): kind for kind in ItemKind if kind.is_structure}
 
 
 @dataclass(frozen=True, slots=True, eq=False)

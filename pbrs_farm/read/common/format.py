@@ -37,7 +37,7 @@ def root_of(given: GivenFile) -> tuple[RootFolder, str]:
 
 
 def data_of(given: GivenFile, max_bytes: int) -> tuple[RootFolder, bytes]:
-    """The folder of the file, which knows what was read in it, and the file's bytes; BadHouse without it."""
+    """The folder of the file, which records all reads, and the bytes of the file; BadHouse if it is missing."""
     folder = RootFolder(given.path.parent)
     data = folder.read(given.path.name, max_bytes=max_bytes)
     if data is None:

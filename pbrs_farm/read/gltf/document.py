@@ -31,8 +31,8 @@ MAX_NODES: Final = 200_000  # of the scene; a node may have several instances
 MAX_DEPTH: Final = 200  # levels of the node tree
 _MOVES: Final = frozenset({"matrix", "rotation", "scale", "translation"})  # keys of a node
 
-# Use of each extension: files may require those that are read; others are unseen without a visible effect
-# for a reader that ignores them: a fallback is included, or they do not concern the picture.
+# Use of each extension: files may require those that are read; "unseen" ones have no visible
+# effect for a reader that ignores them: a fallback is included, or they do not concern the picture.
 _USES: Final = {row["name"]: row["use"] for row in rows_of_table("extensions.csv", "gltf")}
 _INSTANCING: Final = "EXT_mesh_gpu_instancing"
 _TRIANGLES, _STRIP, _FAN = 4, 5, 6  # values of primitive.mode

@@ -30,12 +30,7 @@ _NYU40_IDS: Final = {name.replace(" ", "_"): i for i, name in enumerate(NYU40_NA
     "void": 0,
     "refridgerator": REFRIGERATOR,
 }
-_KIND_OF_CLASS: Final = {
-    "window": ItemKind.WINDOW,
-    "door": ItemKind.DOOR,
-    "lamp": ItemKind.LAMP,
-    "person": ItemKind.PERSON,
-}
+_KIND_OF_CLASS: Final = {name: ItemKind(name) for name in ("window", "door", "lamp", "person")}
 
 
 @dataclass(frozen=True, slots=True)
@@ -84,7 +79,7 @@ def table_places(name: str) -> tuple[str, str]:
 def _find_table(
     folder: RootFolder, *names: str, notes: Notes | None = None, lack: str = ""
 ) -> tuple[str, bytes] | None:
-    """(place, bytes) of the first of some tables; without one None, and a note of what is lacking."""
+    """(place, bytes) of the first of some tables; None without one, and a note."""
     for name in names:
         for place in table_places(name):
             data = folder.read(place, max_bytes=_MAX_TABLE_BYTES)
