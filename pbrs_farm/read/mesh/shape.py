@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from typing import Final
 
 import numpy as np
@@ -25,7 +25,8 @@ class Shape:
     faces: I64  # (F, 3)
     uvs: F64 | None = None  # (V, 2)
     normals: F64 | None = None  # (V, 3)
-    polygon: I64 | None = None  # (F,) the polygon that a triangle was cut from; None of solids
+    # (F,) the polygon that a triangle was cut from; empty for solids
+    polygon: I64 = field(default_factory=lambda: np.zeros(0, np.int64))
 
 
 def shape_of_surface(surface: Surface, order: Sequence[int] = (0, 1, 2)) -> Shape:

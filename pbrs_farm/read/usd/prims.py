@@ -233,7 +233,7 @@ class StageNodes:
             return None
         if shape.uvs is not None:
             down = shape.uvs.astype(np.float32) * V_DOWN + np.array([0, 1], np.float32)
-            shape = replace(shape, uvs=down)
+            shape = replace(shape, uvs=down.astype(np.float64))
         place, name = str(prim.GetPath()), prim.GetName()[:100]
         return self._scene.add_mesh(shape, parts, place, self._fields, name=name)
 
@@ -241,7 +241,7 @@ class StageNodes:
         """(triangles, material) of each subset of a mesh's faces, and of the rest."""
         rest = np.ones(len(shape.faces), np.bool_)
         binding = UsdShade.MaterialBindingAPI(prim)
-        for subset in () if shape.polygon is None else binding.GetMaterialBindSubsets():
+        for subset in binding.GetMaterialBindSubsets() if len(shape.polygon) else ():
             chosen = np.asarray(subset.GetIndicesAttr().Get(self._time) or [], np.int64)
             is_own = np.isin(shape.polygon, chosen) & rest
             rest &= ~is_own
