@@ -75,11 +75,11 @@ def main(words: Sequence[str] = ()) -> None:
     """Render missing views, measure, write the figures and the sheets."""
     if words and words[0] == "--photographs":
         files = sorted(path for folder in words[1:] for path in Path(folder).iterdir())
-        pictures = [np.asarray(Image.open(file).convert("RGB")) for file in files]
-        rows = np.array([picture_row(p, np.zeros(p.shape[:2], bool)) for p in pictures])
-        print(*(f"{name} {value}" for name, value in figures_of(rows).items()), sep="\n")
+        photographs = [np.asarray(Image.open(file).convert("RGB")) for file in files]
+        measured = np.array([picture_row(p, np.zeros(p.shape[:2])) for p in photographs])
+        print(*(f"{name} {value}" for name, value in figures_of(measured).items()), sep="\n")
         return
-    rows, views, neutral = [], list[Frame](), list[Srgb8Image]()
+    rows, views, neutral = list[F64](), list[Frame](), list[Srgb8Image]()
     for place in words or [_rendered()]:
         recipe = recipe_from_json((Path(place) / "recipe.json").read_bytes(), place)
         for frame in open_views(place):
@@ -136,7 +136,7 @@ def picture_row(picture: Srgb8Image, is_window: F64) -> F64:
     rgb = picture.astype(np.float64)
     luma = _luma(picture)
     p1, p95 = np.percentile(luma, [1, 95])
-    shares = [(luma < 20), (luma < 3), (luma > 245), (luma > 245) & ~is_window]
+    shares = [(luma < 20), (luma < 3), (luma > 245), (luma > 245) & (is_window == 0)]
     chroma = (rgb.max(axis=-1) - rgb.min(axis=-1)).mean()
     return np.array([luma.mean(), luma.std(), p1, p95, *(s.mean() for s in shares), chroma])
 

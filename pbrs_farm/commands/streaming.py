@@ -105,7 +105,12 @@ def _homes_of(
         if is_fault:
             raise BadInput(file, place, f"cannot be streamed: {text}")
     check_lens(layers, recipe.lens.lens)
-    settings: dict[str, Any] = {"light.groups": "lamps", "light.denoise": False}
+    # The stream itself draws lamps that are on, another choice each epoch.
+    settings: dict[str, Any] = {
+        "light.groups": "lamps",
+        "light.denoise": False,
+        "emission.lamps_on": 1.0,
+    }
     if size is not None:
         settings |= {"image.width_px": size[0], "image.height_px": size[1]}
     recipe = with_settings(recipe, settings)

@@ -70,6 +70,15 @@ def view(value: float) -> CachedView:
     return CachedView(facts, labels, {}, light, recipe_from_name("preview").tone)
 
 
+def test_a_stream_of_a_set_stores_every_lamp_also_those_that_its_pictures_have_off(
+    tmp_path: Path,
+) -> None:
+    text = '[render]\nrecipe = "fast"\nset = ["emission.lamps_on=0.5"]\n'
+    (tmp_path / "dim.toml").write_text(text + '[part.views]\nhomes = ["builtin"]\nviews = 2\n')
+    stream = pf.stream(tmp_path / "dim.toml", layers=("colour",), cache=tmp_path / "cache")
+    assert [home.recipe.emission.lamps_on for home in stream.plan.homes] == [1.0]
+
+
 def test_each_epoch_has_each_view_once_in_another_order(tmp_path: Path) -> None:
     small = plan(tmp_path)
     orders = [small.order(epoch).tolist() for epoch in range(3)]
