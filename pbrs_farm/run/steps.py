@@ -24,7 +24,6 @@ from pbrs_farm.core.lighting import ALL_MODES
 from pbrs_farm.core.recipe import Recipe, picture_groups
 from pbrs_farm.crash_notes import note_step
 from pbrs_farm.formats.cameras_json import cameras_json
-from pbrs_farm.formats.illuminance_json import illuminance_json
 from pbrs_farm.formats.layer_file import layer_bytes
 from pbrs_farm.formats.marker import read_marker
 from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
@@ -335,7 +334,7 @@ def _illuminance(work: Work) -> StepOutput:
     record = illuminance_record(cached.house, lux, is_day=is_day)
     warnings = {row["room"]: row["warnings"] for row in record["rooms"] if row["warnings"]}
     return StepOutput(
-        {"illuminance.json": illuminance_json(record, cached.sky.facts())},
+        {"illuminance.json": json_bytes({**record, "sky": cached.sky.facts()})},
         {"floor_lux": lux, "warnings": warnings},
     )
 

@@ -17,11 +17,10 @@ from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.shown_text import hint_of_choice
 from pbrs_farm.regular_files import digest_of_regular, files_below, new_folder
 from pbrs_farm.views.dataset_json import DATASET_JSON, Dataset, Shard, dataset_json
-from pbrs_farm.views.packing.croissant import croissant_json
 from pbrs_farm.views.packing.data_card import dataset_description, root_facts
 from pbrs_farm.views.packing.packed_view import packed_view
 from pbrs_farm.views.packing.packing_plan import FORMS, Packing, ShardPlan, shard_plans
-from pbrs_farm.views.packing.parquet_files import croissant_kind, write_parquet
+from pbrs_farm.views.packing.parquet_files import croissant_json, croissant_kind, write_parquet
 from pbrs_farm.views.packing.readme_card import card
 from pbrs_farm.views.shard_tar import write_samples
 from pbrs_farm.views.stored_root import StoredRoot
