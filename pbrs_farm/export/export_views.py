@@ -157,17 +157,13 @@ def questions_of(frames: Views) -> list[dict[str, Any]]:
 
     Walks are asked about as wholes. Raises BadInput for frames of shards.
     """
-    from pbrs_farm.export.questions.asking import Asker, Question
     from pbrs_farm.export.questions.clips import clips_of
-    from pbrs_farm.export.questions.pairs import clips_by_home, pair_questions
+    from pbrs_farm.export.questions.pairs import all_questions
 
     with _stored(frames) as (folder, chosen):
         entries = [v for v in views_of(folder) if (v.house.id, v.id) in chosen]
-        asker, questions, pairs = Asker(), list[Question](), list[Question]()
-        for clips in clips_by_home(clips_of([ChosenView(v, Choice()) for v in entries])):
-            questions += asker.asked(clips)
-            pairs += pair_questions(clips, len(pairs) // 2)
-    return [q.row(k) | q.facts() for k, q in enumerate((*questions, *pairs))]
+        questions = all_questions(clips_of([ChosenView(v, Choice()) for v in entries]))
+    return [q.row(k) | q.facts() for k, q in enumerate(questions)]
 
 
 @contextmanager

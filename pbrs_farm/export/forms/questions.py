@@ -19,9 +19,9 @@ from pbrs_farm.export.chosen_view import Choice, ChosenView
 from pbrs_farm.export.content import Files, parquet_bytes, write_files
 from pbrs_farm.export.form import PICTURES, REMARKS, Convention, ViewForm
 from pbrs_farm.export.forms.coco import categories_of, compact_json, numbered_annotations
-from pbrs_farm.export.questions.asking import DATASET, Asker, Question, blind_scores
+from pbrs_farm.export.questions.asking import DATASET, Question, blind_scores
 from pbrs_farm.export.questions.clips import Clip, clips_of
-from pbrs_farm.export.questions.pairs import clips_by_home, pair_questions
+from pbrs_farm.export.questions.pairs import all_questions
 from pbrs_farm.export.questions.references import references_of
 from pbrs_farm.export.sequences import pace_of
 from pbrs_farm.formats.film_mp4 import film
@@ -46,17 +46,15 @@ def write_questions(views: list[ChosenView], out: Path, choice: Choice) -> None:
     a picture, and models without a home, are left out. Raises BadInput for a damaged house, MachineFailed
     for walks without PyAV.
     """
-    asker, questions, pairs = Asker(), list[Question](), list[Question]()
     media: dict[str, str] = {}
     pictures: list[Clip] = []
-    for clips in clips_by_home(clips_of(views)):
-        for clip in clips:
-            media[clip.name] = f"{DATASET}/{clip.name}.{'mp4' if clip.is_walk else 'png'}"
-            write_files(out, [{media[clip.name]: _medium(clip)}])
-            questions += asker.asked([clip])
-            pictures += () if clip.is_walk else (clip,)
-        pairs += pair_questions(clips, len(pairs) // 2)
-    questions += pairs
+
+    def keep(clip: Clip) -> None:
+        media[clip.name] = f"{DATASET}/{clip.name}.{'mp4' if clip.is_walk else 'png'}"
+        write_files(out, [{media[clip.name]: _medium(clip)}])
+        pictures.extend(() if clip.is_walk else (clip,))
+
+    questions = all_questions(clips_of(views), keep)
     scores = blind_scores(questions)
     write_files(
         out, [_lists(questions, media), _references(pictures, media, choice), _blind(scores)]

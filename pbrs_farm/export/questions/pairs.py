@@ -20,7 +20,7 @@ import numpy as np
 from pbrs_farm.core import keys
 from pbrs_farm.core.edits import unedited_id
 from pbrs_farm.core.lighting import Mode
-from pbrs_farm.export.questions.asking import Question
+from pbrs_farm.export.questions.asking import Asker, Question
 from pbrs_farm.export.questions.clips import WHOLE, Clip, Thing
 from pbrs_farm.export.questions.kinds import (
     bearing_deg,
@@ -70,6 +70,22 @@ def clips_by_home(clips: Iterable[Clip]) -> Iterator[list[Clip]]:
     """The clips of each home together with those of its edited versions, which follow each other."""
     for _home, group in groupby(clips, lambda clip: unedited_id(clip.house.id)):
         yield list(group)
+
+
+def all_questions(
+    clips: Iterable[Clip], tell: Callable[[Clip], None] = lambda _clip: None
+) -> list[Question]:
+    """The questions of clips, then the pairs of each home; tell: called with each clip.
+
+    Holds one home at a time.
+    """
+    asker, questions, pairs = Asker(), list[Question](), list[Question]()
+    for of_home in clips_by_home(clips):
+        for clip in of_home:
+            tell(clip)
+        questions += asker.asked(of_home)
+        pairs += pair_questions(of_home, len(pairs) // 2)
+    return questions + pairs
 
 
 def pair_questions(clips: Sequence[Clip], first_pair: int) -> list[Question]:
