@@ -191,7 +191,10 @@ def decoded_textures(
 
 
 class DecodedOnDemand(Mapping[str, NDArray[np.uint8]]):
-    """Pictures by texture id as of `decoded_textures`, decoded at each look-up, where an unreadable one is missing."""
+    """Pictures by texture id as of `decoded_textures`, each decoded when it is looked up.
+
+    An unreadable one is a key, but looking it up raises KeyError.
+    """
 
     def __init__(self, textures: Mapping[str, Texture]) -> None:
         self._textures = textures
@@ -204,6 +207,9 @@ class DecodedOnDemand(Mapping[str, NDArray[np.uint8]]):
             return decode_texture(texture.data, texture.name, texture.media_type)
         except BadInput:
             raise KeyError(name) from None
+
+    def __contains__(self, name: object) -> bool:
+        return name in self._textures
 
     def __iter__(self) -> Iterator[str]:
         return iter(self._textures)

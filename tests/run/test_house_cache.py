@@ -14,7 +14,7 @@ from pbrs_farm.core.house import Texture
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.images import png_from_array
 from pbrs_farm.prepare.source import resolve
-from pbrs_farm.run.house_cache import HouseCache, decoded_textures
+from pbrs_farm.run.house_cache import DecodedOnDemand, HouseCache, decoded_textures
 from pbrs_farm.run.step_cache import Work
 from pbrs_farm.run.steps import run_step
 from pbrs_farm.store import MemoryStore
@@ -95,3 +95,16 @@ def test_only_the_named_textures_are_decoded() -> None:
     assert decoded_textures(house, {"a", "b"})[0].keys() == {"a"}  # type: ignore[arg-type]
     assert decoded_textures(house, {"a", "b"})[1] == ["b"]  # type: ignore[arg-type]
     assert decoded_textures(house)[0].keys() == {"a", "c"}  # type: ignore[arg-type]
+
+
+def test_a_picture_is_decoded_by_its_look_up_alone(monkeypatch: pytest.MonkeyPatch) -> None:
+    asked: list[str] = []
+    monkeypatch.setattr(
+        "pbrs_farm.images.decode_texture", lambda _data, name, _type: asked.append(name)
+    )
+    pictures = DecodedOnDemand({name: Texture(name, name, "image/png", b"") for name in "ab"})
+    assert "a" in pictures
+    assert list(pictures) == ["a", "b"]
+    assert not asked
+    _ = pictures["b"]
+    assert asked == ["b"]
