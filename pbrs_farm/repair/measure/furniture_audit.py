@@ -6,13 +6,12 @@ from collections.abc import Iterator, Sequence
 from itertools import islice
 
 import numpy as np
-from manifold3d import Manifold
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, ItemKind
 from pbrs_farm.repair.repair_report import Floating, FurnitureAudit, Overlap
-from pbrs_farm.repair.structure.booleans import TagTable, common, unite
-from pbrs_farm.repair.structure.closed_shells import closed_shells
+from pbrs_farm.repair.structure.booleans import common
+from pbrs_farm.repair.structure.closed_shells import ClosedShells
 
 _TOUCH_M = 0.02  # boxes nearer than this touch
 _SAME_M = 0.001  # maximum difference between boxes at the same place, metres
@@ -60,36 +59,31 @@ def _pairs_of_boxes(boxes: F64, by_m: float) -> Iterator[tuple[int, int]]:
 def _find_overlaps(
     pieces: Sequence[Item], boxes: F64, pairs: Sequence[tuple[int, int]]
 ) -> Iterator[Overlap]:
-    solids: dict[int, Manifold | None] = {}
+    shells: dict[int, ClosedShells] = {}
     for i, j in pairs:
         # Bound the overlap by the boxes' first, which settles a cup on a table.
-        shared = np.minimum(boxes[i, 1], boxes[j, 1]) - np.maximum(boxes[i, 0], boxes[j, 0])
-        if np.prod(shared) <= _MIN_VOLUME_M3:
+        low, high = np.maximum(boxes[i, 0], boxes[j, 0]), np.minimum(boxes[i, 1], boxes[j, 1])
+        if np.prod(high - low) <= _MIN_VOLUME_M3:
             continue
-        # Build the solid of a piece when its box first meets another.
+        if max(pieces[i].n_faces, pieces[j].n_faces) > _MAX_FACES:
+            continue
         for k in (i, j):
-            if k not in solids:
-                solids[k] = _solid(pieces[k])
-        a, b = solids[i], solids[j]
-        if a is None or b is None:
+            if k not in shells:
+                shells[k] = ClosedShells(pieces[k])
+        # Intersect the solids near the shared box exactly.
+        a, b = (shells[k].within(low, high) for k in (i, j))
+        volume = float(common(a, b).volume()) if a is not None and b is not None else 0.0
+        if volume <= _MIN_VOLUME_M3:
             continue
-        # Intersect the solids exactly.
-        volume = float(common(a, b).volume())
-        share = volume / max(min(float(a.volume()), float(b.volume())), 1e-12)
-        if volume > _MIN_VOLUME_M3 and share > _MIN_SHARE:
+        wholes = (shells[k].within(*boxes[k]) for k in (i, j))
+        share = volume / max(min(float(w.volume()) for w in wholes if w is not None), 1e-12)
+        if share > _MIN_SHARE:
             yield Overlap(
                 a=pieces[i].id,
                 b=pieces[j].id,
                 volume_m3=round(volume, 6),
                 share=round(min(share, 1.0), 4),
             )
-
-
-def _solid(item: Item) -> Manifold | None:
-    if item.n_faces > _MAX_FACES:
-        return None
-    shells = closed_shells(item, TagTable())
-    return unite(shells) if shells else None
 
 
 def _floating(house: House, pieces: Sequence[Item], boxes: F64) -> Iterator[Floating]:

@@ -12,9 +12,11 @@ from manifold3d import Manifold
 from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.house import Item, Surface
 from pbrs_farm.core.mesh import (
+    boxes_meeting,
     face_areas,
     faces_with_area,
     numbered_points,
+    points_bounds,
     signed_volume,
     triangle_corners,
     unit_normals,
@@ -27,6 +29,7 @@ from pbrs_farm.repair.structure.booleans import (
     TagTable,
     faces_of_patches,
     solid_from_patches,
+    unite,
 )
 from pbrs_farm.repair.structure.slivers import MIN_AREA_M2
 
@@ -105,16 +108,26 @@ def _shows_a_room(patches: Sequence[Patch]) -> bool:
     return 2 * volume < -_THICKER_THAN_WALLS_M * area
 
 
-def closed_shells(item: Item, table: TagTable) -> list[Manifold]:
-    """The closed solids among the connected parts of an item, as manifold3d accepts them."""
-    patches = [patch_from_surface(s, 0) for s in item.surfaces if len(s.faces)]
-    if not patches:
-        return []
-    parts = _split(patches, components(patches))
-    # A solid has at least four faces; skip leaves and sheets.
-    large = [part for part in parts if sum(len(p.faces) for p in part) >= _LEAST_FACES]
-    solids = (solid_from_patches(part, table) for part in large)
-    return [s for s in solids if s is not None]
+class ClosedShells:
+    """The closed solids among the connected parts of an item, each made when its box is asked for."""
+
+    def __init__(self, item: Item) -> None:
+        patches = [patch_from_surface(s, 0) for s in item.surfaces if len(s.faces)]
+        parts = _split(patches, components(patches)) if patches else []
+        # A solid has at least four faces; skip leaves and sheets.
+        self._parts = [p for p in parts if sum(len(patch.faces) for patch in p) >= _LEAST_FACES]
+        ends = [points_bounds(np.concatenate([p.positions for p in part])) for part in self._parts]
+        self._low, self._high = np.array(ends).reshape(-1, 2, 3).transpose(1, 0, 2)
+        self._solids: dict[int, Manifold | None] = {}
+
+    def within(self, low: F64, high: F64) -> Manifold | None:
+        """Union of the solids whose boxes meet the box low..high (3,), metres; None without any."""
+        near = np.flatnonzero(boxes_meeting(self._low, self._high, low, high)).tolist()
+        for k in near:
+            if k not in self._solids:
+                self._solids[k] = solid_from_patches(self._parts[k], TagTable())
+        solids = [s for k in near if (s := self._solids[k]) is not None]
+        return unite(solids) if solids else None
 
 
 def components(patches: Sequence[Patch]) -> list[I64]:

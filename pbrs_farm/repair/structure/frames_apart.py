@@ -17,7 +17,14 @@ from scipy.spatial import cKDTree
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import House, Item, ItemKind, Surface, corners_of_surfaces
-from pbrs_farm.core.mesh import area_vectors, unit_normals
+from pbrs_farm.core.mesh import (
+    area_vectors,
+    boxes_meeting,
+    lengths,
+    points_bounds,
+    triangle_bounds,
+    unit_normals,
+)
 
 MOVED_M = 5e-4
 """Distance that an item is moved out of a coplanar face, metres."""
@@ -96,7 +103,7 @@ def _move_parts_once(house: House) -> tuple[House, set[tuple[int, int]]]:
 def _pairs_in_one_plane(corners: F64, of: NDArray[np.intp]) -> list[tuple[int, int, F64, float]]:
     """(later part, earlier part, normal, offset) of parts `of` (F,) that share area in a plane."""
     vectors = area_vectors(corners)
-    twice = np.linalg.norm(vectors, axis=1)
+    twice = lengths(vectors)
     faces = np.flatnonzero(twice > 2 * _LEAST_FACE_M2)
     if not len(faces):
         return []
@@ -117,7 +124,8 @@ def _pairs_in_one_plane(corners: F64, of: NDArray[np.intp]) -> list[tuple[int, i
             int(p): corners[faces[group[of[faces[group]] == p]]]
             for p in np.unique(of[faces[group]])
         }
-        boxes = {p: (c.min((0, 1)), c.max((0, 1))) for p, c in members.items()}
+        boxes = {p: points_bounds(c.reshape(-1, 3)) for p, c in members.items()}
+        outlines = dict[int, shapely.Geometry]()
         for part in sorted(members, reverse=True):
             low, high = boxes[part]
             for earlier in members:
@@ -129,10 +137,9 @@ def _pairs_in_one_plane(corners: F64, of: NDArray[np.intp]) -> list[tuple[int, i
                 if spans.min() < -_COINCIDE_M or longer[0] < 0 or 2 * longer.prod() < _SEEN_M2:
                     continue
                 axes = np.linalg.svd(normal[None])[2][1:]
-                shared = shapely.intersection(
-                    _outline_of_faces(members[part], axes),
-                    _outline_of_faces(members[earlier], axes),
-                )
+                for p in {part, earlier} - outlines.keys():
+                    outlines[p] = _outline_of_faces(members[p], axes)
+                shared = shapely.intersection(outlines[part], outlines[earlier])
                 if float(shapely.area(shared)) > _SEEN_M2:
                     pairs.append((part, earlier, normal, offset))
                     break
@@ -169,9 +176,9 @@ def _move_out_of_planes(item: Item, walls: Sequence[Item]) -> Item:
 def _faces_of_structure(items: Sequence[Item], low: F64, high: F64) -> _Faces:
     # Leave out faces without area, and those outside the box low..high and its reach.
     corners = corners_of_surfaces(s for i in items for s in i.surfaces)
-    corners = corners[np.linalg.norm(area_vectors(corners), axis=1) > 1e-8]
-    near = (corners.min(1) < high + 2 * MOVED_M) & (corners.max(1) > low - 2 * MOVED_M)
-    corners = corners[near.all(1)]
+    corners = corners[lengths(area_vectors(corners)) > 1e-8]
+    least, most = triangle_bounds(corners)
+    corners = corners[boxes_meeting(least, most, low - 2 * MOVED_M, high + 2 * MOVED_M)]
     return _Faces(corners, unit_normals(corners))
 
 
