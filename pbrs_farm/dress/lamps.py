@@ -13,7 +13,7 @@ from pbrs_farm.dress.ceiling_lamps import PASS, hang_from_ceiling
 from pbrs_farm.dress.fitting_pieces import own_or_all
 from pbrs_farm.dress.made_lamps import floor_lamp, table_lamp, with_flux
 from pbrs_farm.dress.mutable_house import MutableHouse
-from pbrs_farm.dress.space import HouseSpace, RoomSpace, doors_are_joined, floor_bitmap, house_space
+from pbrs_farm.dress.space import FloorCells, HouseSpace, RoomSpace, doors_are_joined, house_space
 from pbrs_farm.dress.style import Style
 from pbrs_farm.dress.walls.hanging import WANTS, next_id
 from pbrs_farm.geometry.heights import highest_below
@@ -160,8 +160,9 @@ def _ways_are_open(house: MutableHouse, room_id: str) -> bool:
     space = house_space(house)
     room = space.room(room_id)
     last = len(house.items) - 1
-    before = doors_are_joined(floor_bitmap(space, room, without=(last,)), room)
-    return not before or doors_are_joined(floor_bitmap(space, room), room)
+    floor = FloorCells(space, room)
+    before = doors_are_joined(floor.bitmap((last,)), room)
+    return not before or doors_are_joined(floor.bitmap(), room)
 
 
 def _spot_on_top(

@@ -14,7 +14,7 @@ from pbrs_farm.core.walkable import CELL_M, FloorGrid
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import FloorBitmap, HouseSpace, RoomSpace, WallFace
 from pbrs_farm.dress.space.flights import flights_of
-from pbrs_farm.dress.space.floor_bitmaps import doors_are_joined, floor_bitmap, with_body
+from pbrs_farm.dress.space.floor_bitmaps import FloorCells, doors_are_joined, with_body
 from pbrs_farm.dress.space.wall_faces import CELL_M as WALL_CELL_M
 from pbrs_farm.dress.walls.hanging import Hanging
 from pbrs_farm.geometry.swept import floor_swept
@@ -76,7 +76,7 @@ class RoomFloor:
     @classmethod
     def of(cls, house: MutableHouse, space: HouseSpace, room: RoomSpace) -> RoomFloor | None:
         """The room in the current state of house and space; None without a floor or walls."""
-        bitmap = floor_bitmap(space, room)
+        bitmap = FloorCells(space, room).bitmap()
         if not bitmap.inside.any() or not room.faces:
             return None
         zones = []

@@ -8,12 +8,14 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
+from functools import cache
 from pathlib import Path
 from typing import Annotated, ClassVar, Final, Literal, TypeVar
 
 import numpy as np
 from pydantic import BeforeValidator, ConfigDict, model_validator
 
+from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadRecipe
 from pbrs_farm.core.record import Record, read_toml
 from pbrs_farm.core.shown_text import hint_of_choice
@@ -214,6 +216,12 @@ def mix(a: Rgb, b: Rgb, t: float) -> Rgb:
 
 
 def _usual_first(rng: np.random.Generator, choices: tuple[_T, ...]) -> _T:
-    # The first twice as likely as each of the others.
-    weights = np.array([2.0] + [1.0] * (len(choices) - 1))
-    return choices[int(rng.choice(len(choices), p=weights / weights.sum()))]
+    # The first twice as likely as each of the others; as rng.choice draws, in a tenth of its time.
+    return choices[int(_likelihoods(len(choices)).searchsorted(rng.random(), "right"))]
+
+
+@cache
+def _likelihoods(n: int) -> F64:
+    weights = np.array([2.0] + [1.0] * (n - 1))
+    sums = (weights / weights.sum()).cumsum()
+    return np.asarray(sums / sums[-1])

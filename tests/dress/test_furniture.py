@@ -16,7 +16,7 @@ from pbrs_farm.core.mesh import signed_volume, triangle_corners
 from pbrs_farm.dress.furniture import KINDS, add_furniture, model_from_catalogue
 from pbrs_farm.dress.models import Model
 from pbrs_farm.dress.mutable_house import MutableHouse
-from pbrs_farm.dress.space import doors_are_joined, floor_bitmap, house_space
+from pbrs_farm.dress.space import FloorCells, doors_are_joined, house_space
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.dress.supports import supports_of_item
 from pbrs_farm.dress.thing_materials import plain
@@ -133,7 +133,7 @@ def test_doors_stay_free_and_joined_and_the_floor_open(seed: int) -> None:
             assert side is not None
             assert not door.before(side).union(door.swing(side)).intersects(body)
     for room in space.rooms:
-        bitmap = floor_bitmap(space, room)
+        bitmap = FloorCells(space, room).bitmap()
         assert doors_are_joined(bitmap, room)
         assert (bitmap.occupied & bitmap.inside).sum() < 0.6 * bitmap.inside.sum()
 

@@ -17,12 +17,7 @@ from pbrs_farm.dress.clutter.placing import Placing, separate_pair
 from pbrs_farm.dress.clutter.stock import CLUTTER
 from pbrs_farm.dress.models import Model
 from pbrs_farm.dress.space.flights import flights_of
-from pbrs_farm.dress.space.floor_bitmaps import (
-    FloorBitmap,
-    doors_are_joined,
-    floor_bitmap,
-    with_body,
-)
+from pbrs_farm.dress.space.floor_bitmaps import FloorBitmap, FloorCells, doors_are_joined, with_body
 from pbrs_farm.dress.space.house_space import HouseSpace, RoomSpace
 from pbrs_farm.dress.supports import faces_around
 from pbrs_farm.dress.worktop import LIFT_M
@@ -84,7 +79,7 @@ def _floor_of_room(scene: SceneTriangles, space: HouseSpace, room: RoomSpace) ->
     if room.area.is_empty or room.room.polygon.shape[0] < 3:
         return None
     y = room.room.floor_y
-    bitmap = floor_bitmap(space, room)
+    bitmap = FloorCells(space, room).bitmap()
     grid = PlanGrid(np.asarray(bitmap.origin), 0.0, CELL_M, bitmap.inside.shape)
     plan = grid.centres()
     around = faces_around(scene, (), grid, y)

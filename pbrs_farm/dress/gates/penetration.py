@@ -54,16 +54,18 @@ def is_allowed(a: Body, b: Body) -> bool:
 
 def penetration_m(a: Body, b: Body, solids: Solids) -> float:
     """Metres, 0 if apart: the deepest point, the overlap's thickness or an edge's way through a face."""
-    deepest = 0.0
-    for shell in _shells_near(a, b):
-        for other_shell in _shells_near(b, a):
+    deepest, others = 0.0, _shells_near(b, a)
+    for shell in _shells_near(a, b) if others else ():
+        for other_shell in others:
             if _box_depth(shell.low, shell.high, other_shell.low, other_shell.high) > MOST_M:
                 deepest = max(deepest, _depth_of_shells(shell, other_shell, solids))
     return deepest
 
 
 def _shells_near(body: Body, other: Body) -> list[Shell]:
-    return [s for s in body.shells if _box_depth(s.low, s.high, other.low, other.high) > MOST_M]
+    shells = body.shells
+    depths = _box_depth(other.low, other.high, shells.low, shells.high)
+    return [shells[k] for k in np.flatnonzero(depths > MOST_M).tolist()]
 
 
 def _depth_of_shells(a: Shell, b: Shell, solids: Solids) -> float:

@@ -12,7 +12,7 @@ from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.classes import BLINDS, CURTAIN, FLOOR_MAT, SHOWER_CURTAIN
 from pbrs_farm.core.mesh import clipped_to_box
 from pbrs_farm.dress.gates.bodies import Body, boxes_of
-from pbrs_farm.dress.space import HouseSpace, Passage, RoomSpace, doors_are_joined, floor_bitmap
+from pbrs_farm.dress.space import FloorCells, HouseSpace, Passage, RoomSpace, doors_are_joined
 
 MOST_COVERED: Final = 0.2  # share of a window that furniture may cover
 _HEAD_M: Final = 2.0  # higher items block no door, metres above the floor
@@ -126,20 +126,21 @@ def closed_ways(space: HouseSpace, bodies: Sequence[Body]) -> tuple[int, list[Bl
             continue
         n += 1
         new = [k for k in room.items if bodies[k].is_new]
-        if _is_joined(space, room, ()) or not _is_joined(space, room, new):
+        floor = FloorCells(space, room)
+        if _is_joined(floor, room, ()) or not _is_joined(floor, room, new):
             continue
         without: list[int] = []
         for number in reversed(new):
             # Name what alone opens the way, or what does with those before it.
-            if _is_joined(space, room, [number]):
+            if _is_joined(floor, room, [number]):
                 without = [number]
                 break
             without.append(number)
-            if _is_joined(space, room, without):
+            if _is_joined(floor, room, without):
                 break
         blocked += [Blocked(room.room.id, bodies[k].index) for k in without]
     return n, blocked
 
 
-def _is_joined(space: HouseSpace, room: RoomSpace, without: Collection[int]) -> bool:
-    return doors_are_joined(floor_bitmap(space, room, without=without), room)
+def _is_joined(floor: FloorCells, room: RoomSpace, without: Collection[int]) -> bool:
+    return doors_are_joined(floor.bitmap(without), room)

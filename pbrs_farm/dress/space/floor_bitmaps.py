@@ -30,30 +30,31 @@ class FloorBitmap:
         return FloorGrid(self.origin, self.inside.shape).cells(places)
 
 
-def floor_bitmap(
-    space: HouseSpace, room: RoomSpace, *, without: Collection[int] = ()
-) -> FloorBitmap:
-    """The room's floor in cells of 5 cm: inside, occupied, walkable ways.
+class FloorCells:
+    """A room's floor in cells of 5 cm, and the cells below each item between 8 cm and 1.8 m."""
 
-    A cell is occupied if an item has a point between 8 cm and 1.8 m above the floor; ways are the cells
-    where someone 0.6 m wide can walk. without: indices of items to ignore.
-    """
-    x0, z0, x1, z1 = room.area.bounds if not room.area.is_empty else (0.0, 0.0, CELL_M, CELL_M)
-    grid = FloorGrid.over(x0, z0, x1, z1)
-    xx, zz = grid.middles
-    inside = shapely.contains_xy(room.area, xx, zz) & ~shapely.contains_xy(room.walls, xx, zz)
-    # Mark every cell below an item's point between step and head height.
-    occupied = np.zeros(grid.shape, bool)
-    low, high = room.room.floor_y + STEP_M, room.room.floor_y + HEAD_M
-    for number in room.items:
-        points = space.points[number]
-        if number in without:
-            continue
-        body = points[(points[:, 1] > low) & (points[:, 1] < high)]
-        occupied |= grid.marked(body[:, [0, 2]])
-    occupied &= inside
-    ways = connected_ways(inside & ~occupied)
-    return FloorBitmap(grid.origin, np.asarray(inside), occupied, ways)
+    def __init__(self, space: HouseSpace, room: RoomSpace) -> None:
+        x0, z0, x1, z1 = room.area.bounds if not room.area.is_empty else (0.0, 0.0, CELL_M, CELL_M)
+        self._grid = FloorGrid.over(x0, z0, x1, z1)
+        xx, zz = self._grid.middles
+        inside = shapely.contains_xy(room.area, xx, zz)
+        self._inside = np.asarray(inside & ~shapely.contains_xy(room.walls, xx, zz))
+        self._below: dict[int, Bools] = {}  # cells by the item's index
+        low, high = room.room.floor_y + STEP_M, room.room.floor_y + HEAD_M
+        for number in room.items:
+            points = space.points[number]
+            body = points[(points[:, 1] > low) & (points[:, 1] < high)]
+            self._below[number] = self._grid.marked(body[:, [0, 2]])
+
+    def bitmap(self, without: Collection[int] = ()) -> FloorBitmap:
+        """The floor with ways 0.6 m wide between its items; without: indices of items to ignore."""
+        occupied = np.zeros(self._grid.shape, bool)
+        for number, cells in self._below.items():
+            if number not in without:
+                occupied |= cells
+        occupied &= self._inside
+        ways = connected_ways(self._inside & ~occupied)
+        return FloorBitmap(self._grid.origin, self._inside, occupied, ways)
 
 
 def with_body(bitmap: FloorBitmap, body: Bools, width_m: float = WALK_M) -> FloorBitmap:

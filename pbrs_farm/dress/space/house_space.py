@@ -115,27 +115,26 @@ def house_space(house: MutableHouse) -> HouseSpace:
         room = space.room("0_1")
         is_free = space.is_free(low, high)  # a box (3,), (3,) of the world, metres
     """
-    cached = house.kept.get("space")
-    if not isinstance(cached, _KeptSpaces):
-        cached = house.kept["space"] = _empty_house(house)
-    key = tuple(id(item) for item in house.items)
+    cached, key = _kept_spaces(house), tuple(id(item) for item in house.items)
     if cached.space is None or cached.space[0] != key:
-        # Spread points over new items; keep those of the others.
-        for item in house.items:
-            if id(item) not in cached.items:
-                cached.items[id(item)] = _with_points(item)
         cached.space = key, _house_space(house.items, cached)
     return cached.space[1]
 
 
 def floor_space(house: MutableHouse) -> HouseSpace:
     """Like house_space, but cheaper, without wall faces, for passes that use no walls."""
+    cached = _kept_spaces(house)
+    bare = replace(cached, rooms=tuple(replace(room, faces=()) for room in cached.rooms))
+    return _house_space(house.items, bare)
+
+
+def _kept_spaces(house: MutableHouse) -> _KeptSpaces:
+    """The cache of a house, with points on its new items, too."""
     cached = house.kept.get("space")
     if not isinstance(cached, _KeptSpaces):
         cached = house.kept["space"] = _empty_house(house)
     cached.items |= {id(i): _with_points(i) for i in house.items if id(i) not in cached.items}
-    bare = replace(cached, rooms=tuple(replace(room, faces=()) for room in cached.rooms))
-    return _house_space(house.items, bare)
+    return cached
 
 
 def _with_points(item: Item) -> tuple[Item, F64, F64]:

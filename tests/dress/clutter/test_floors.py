@@ -13,7 +13,7 @@ from pbrs_farm.core.house import Item
 from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.dress.clutter import add_clutter
 from pbrs_farm.dress.mutable_house import MutableHouse
-from pbrs_farm.dress.space import doors_are_joined, floor_bitmap, house_space
+from pbrs_farm.dress.space import FloorCells, doors_are_joined, house_space
 from pbrs_farm.dress.style import style_for
 from pbrs_farm.read.builtin.builtin_home import builtin_home
 from tests.dress.furniture import DEPTH, WIDTH, house, solid
@@ -54,8 +54,8 @@ def test_no_item_is_before_a_door_and_the_doors_stay_connected() -> None:
                     zone = door.before(side).union(door.swing(side))
                     assert not any(zone.intersects(f) for f in footprints)
             was = before.room(room.room.id)
-            if doors_are_joined(floor_bitmap(before, was), was):
-                assert doors_are_joined(floor_bitmap(space, room), room)
+            if doors_are_joined(FloorCells(before, was).bitmap(), was):
+                assert doors_are_joined(FloorCells(space, room).bitmap(), room)
 
 
 def test_boxes_and_bins_are_at_walls_and_not_beside_a_free_table() -> None:

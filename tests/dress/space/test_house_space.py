@@ -11,11 +11,11 @@ import shapely
 from pbrs_farm.core.house import House, Item, ItemKind, Room
 from pbrs_farm.dress.mutable_house import MutableHouse
 from pbrs_farm.dress.space import (
+    FloorCells,
     HouseSpace,
     RoomSpace,
     WallFace,
     doors_are_joined,
-    floor_bitmap,
     house_space,
     item_footprint,
 )
@@ -168,13 +168,13 @@ def test_items_belong_to_the_room_around_them(home: House, space: HouseSpace) ->
 def test_a_shelf_across_the_room_parts_its_doors(home: House) -> None:
     mutable = MutableHouse(home, 1)
     space = house_space(mutable)
-    assert doors_are_joined(floor_bitmap(space, space.room("0_0")), space.room("0_0"))
+    assert doors_are_joined(FloorCells(space, space.room("0_0")).bitmap(), space.room("0_0"))
     mutable.items.append(_block("across", (2.6, 0.0, 0.0), (2.8, 2.0, 4.0)))
     space = house_space(mutable)
     room = space.room("0_0")
-    assert not doors_are_joined(floor_bitmap(space, room), room)
+    assert not doors_are_joined(FloorCells(space, room).bitmap(), room)
     new = len(mutable.items) - 1
-    assert doors_are_joined(floor_bitmap(space, room, without=(new,)), room)
+    assert doors_are_joined(FloorCells(space, room).bitmap((new,)), room)
 
 
 def test_a_new_item_takes_wall_and_the_rest_is_kept(home: House) -> None:
@@ -206,7 +206,7 @@ def test_rooms_without_walls_or_outline_have_no_faces_and_do_no_harm(home: House
     space = house_space(MutableHouse(replace(bare, rooms=(*bare.rooms, odd)), 1))
     assert [len(r.faces) for r in space.rooms] == [0, 0, 0]
     for room in space.rooms:
-        floor_bitmap(space, room)
+        FloorCells(space, room).bitmap()
 
 
 def test_a_sloped_ceiling_hides_the_wall_above_it(home: House) -> None:
