@@ -133,9 +133,10 @@ def closed_edge_share(places: NDArray[np.floating]) -> float:
     """Share of edges that an even number of triangles (F, 3, 3), rounded before, meets; 0 without."""
     # Number the places, so that seams of texture and normals do not open the mesh.
     _, vertex = numbered_points(places.reshape(-1, 3))
-    edges = np.sort(vertex.reshape(-1, 3)[:, [0, 1, 1, 2, 2, 0]].reshape(-1, 2), axis=1)
+    a, b = (vertex.reshape(-1, 3)[:, ends].ravel() for ends in ([0, 1, 2], [1, 2, 0]))
     # Count the faces of each edge, leaving out edges of no length.
-    _, n_faces = np.unique(edges[edges[:, 0] != edges[:, 1]], axis=0, return_counts=True)
+    edges = (np.minimum(a, b) * len(vertex) + np.maximum(a, b))[a != b]
+    _, n_faces = np.unique(edges, return_counts=True)
     return float(np.mean(n_faces % 2 == 0)) if len(n_faces) else 0.0
 
 

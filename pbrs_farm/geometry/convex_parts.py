@@ -16,6 +16,7 @@ from pbrs_farm.core.mesh import (
     closed_edge_share,
     face_areas,
     lengths,
+    numbered_points,
     signed_volume,
     unit_normals,
 )
@@ -43,8 +44,7 @@ _STRAIGHT = 0.5  # minimum share of axis-aligned faces for a mesh to keep its ax
 
 def connected(triangles: F64) -> list[F64]:
     """Triangles (F, 3, 3) by what hangs together: corners nearer than 0.01 mm are one."""
-    points = triangles.reshape(-1, 3)
-    corners = np.unique(points.round(5), axis=0, return_inverse=True)[1].reshape(-1, 3)
+    corners = numbered_points(triangles.reshape(-1, 3).round(5))[1].reshape(-1, 3)
     part_of_face = connected_faces(corners)
     return [triangles[part_of_face == k] for k in np.unique(part_of_face)]
 

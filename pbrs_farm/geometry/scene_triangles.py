@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from copy import copy
 
 import numpy as np
 
@@ -28,6 +29,16 @@ class SceneTriangles:
         self.bounds: F64 = np.array(bounds) if bounds else np.zeros((0, 2, 3))
         self._corners: dict[int, F64] = {}
         self._of_faces: dict[int, tuple[F64, F64]] = {}
+
+    def with_item(self, index: int, item: Item) -> SceneTriangles:
+        """The scene with another item at an index; the others' triangles are shared."""
+        changed = copy(self)
+        changed.items = (*self.items[:index], item, *self.items[index + 1 :])
+        changed.bounds = self.bounds.copy()
+        changed.bounds[index] = item.bounds
+        changed._corners = {k: c for k, c in self._corners.items() if k != index}
+        changed._of_faces = {k: b for k, b in self._of_faces.items() if k != index}
+        return changed
 
     def of_item(self, index: int) -> F64:
         """(F, 3, 3) finite faces of items[index], metres; cached, do not write into it."""

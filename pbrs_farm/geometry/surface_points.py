@@ -11,6 +11,7 @@ from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Item
 from pbrs_farm.core.mesh import (
     area_vectors,
+    boxes_meeting,
     finite_triangles,
     lengths,
     triangle_bounds,
@@ -35,22 +36,28 @@ def surface_points(corners: F64, spacing_m: float = SPACING_M, box: F64 | None =
         return np.zeros((0, 3))
     area = float(lengths(area_vectors(corners)).sum()) / 2
     spacing_m = max(spacing_m, float(np.sqrt(area / _MOST_POINTS)))
-    # Represent a small triangle by its centroid.
     low, high = triangle_bounds(corners)
-    size = high - low
-    is_small = np.maximum(np.maximum(size[:, 0], size[:, 1]), size[:, 2]) < spacing_m / 2
-    middles, grids = corners[is_small].sum(1) / 3, _grids(corners[~is_small], spacing_m)
+    least, size = low.min(0), high - low
     # Keep whole cubes at the border of the box, so that their representative points do not change.
     near = None if box is None else (box[0] - spacing_m, box[1] + spacing_m)
+    if near is not None:
+        meets = boxes_meeting(low, high, *near)
+        corners, size = corners[meets], size[meets]
+    # Represent a small triangle by its centroid.
+    is_small = np.maximum(np.maximum(size[:, 0], size[:, 1]), size[:, 2]) < spacing_m / 2
+    middles, grids = corners[is_small].sum(1) / 3, _grids(corners[~is_small], spacing_m)
     points = np.concatenate([middles, grids.points(near)])
     # Fine meshes have many points in one place.
-    columns, least = np.ascontiguousarray(points.T), low.min(0)
+    columns = np.ascontiguousarray(points.T)
     cube = np.floor((columns - least[:, None]) / (spacing_m / 2)).astype(np.int64)
     cube = np.maximum(cube, 0)  # rounding
     cells = cube.max(1, initial=0) + 1
     keys = (cube[0] * cells[1] + cube[1]) * cells[2] + cube[2]
     points = points[_first_of_each(keys, int(cells.prod()))]
-    return points if box is None else points[((points > box[0]) & (points < box[1])).all(1)]
+    if box is None:
+        return points
+    inside = (points > box[0]) & (points < box[1])
+    return points[inside[:, 0] & inside[:, 1] & inside[:, 2]]
 
 
 def spread_points(corners: F64, spacing_m: float) -> tuple[F64, NDArray[np.int64]]:

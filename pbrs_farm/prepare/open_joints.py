@@ -24,10 +24,16 @@ _NEAR: Final = 1e-3  # tolerance of a stopped joint, radians or metres
 
 def opened(house: House, index: int, part: str, share: float) -> House:
     """Open a part of items[index] by a share 0..1 of its range, or, with a note, up to an obstacle."""
-    value, notes = _reach(house, index, part, share)
-    item = item_at(house.items[index], part, value)
-    items = tuple(item if k == index else unchanged for k, unchanged in enumerate(house.items))
-    return replace(house, items=items, notes=(*house.notes, *notes))
+    return _opened(house, SceneTriangles(house.items), index, part, share)[0]
+
+
+def _opened(
+    house: House, scene: SceneTriangles, index: int, part: str, share: float
+) -> tuple[House, SceneTriangles]:
+    """As opened; scene: the triangles of the house's items, returned for the opened house."""
+    value, notes = _reach(scene, index, part, share)
+    scene = scene.with_item(index, item_at(house.items[index], part, value))
+    return replace(house, items=scene.items, notes=(*house.notes, *notes)), scene
 
 
 def keyed(
@@ -41,7 +47,8 @@ def keyed(
     joint = joint_of(house.items[index], part)
     # Measure from the closed state: an open part may already be beyond an obstacle.
     shut = _shut(house, index, part)
-    most, notes = _reach(shut, index, part, max(share for _time, share in keys_of_time))
+    most_share = max(share for _time, share in keys_of_time)
+    most, notes = _reach(SceneTriangles(shut.items), index, part, most_share)
     values = tuple((min(_value(joint, share), most),) for _time, share in keys_of_time)
     motion = Motion(house.items[index].id, part, tuple(t for t, _share in keys_of_time), values)
     item = item_at(house.items[index], part, values[0][0])
@@ -62,12 +69,14 @@ def _shut(house: House, index: int, part: str) -> House:
     return house.with_items(item if k == index else i for k, i in enumerate(house.items))
 
 
-def _reach(house: House, index: int, part: str, share: float) -> tuple[float, tuple[Note, ...]]:
+def _reach(
+    scene: SceneTriangles, index: int, part: str, share: float
+) -> tuple[float, tuple[Note, ...]]:
     """Reachable opening of a part of items[index] towards a share of its range, with notes."""
-    item = house.items[index]
+    item = scene.items[index]
     joint = joint_of(item, part)
     target = _value(joint, share)
-    value, stopped_by = free_value(SceneTriangles(house.items), index, part, target)
+    value, stopped_by = free_value(scene, index, part, target)
     if target - value <= _NEAR:
         return value, ()
     text = f"is open by {_amount(joint, value)} of {_amount(joint, target)}"
@@ -80,6 +89,7 @@ def _value(joint: Joint, share: float) -> float:
 
 def left_open(house: House, share: float, seed: int) -> House:
     """Leave a random share of the doors and drawers, but windows and outer doors, open by random amounts."""
+    scene: SceneTriangles | None = None
     for index, item in enumerate(house.items):
         if item.is_outside or item.is_removed:
             continue
@@ -87,7 +97,8 @@ def left_open(house: House, share: float, seed: int) -> House:
             rng = np.random.default_rng(keys.seed(house.id, "open", seed, item.id, joint.part))
             is_open, far = rng.random() < share, rng.uniform(_LEAST_OPEN, 1.0)
             if is_open and joint.value == 0 and not _has_pane(house, item, joint):
-                house = opened(house, index, joint.part, float(far))
+                scene = scene or SceneTriangles(house.items)
+                house, scene = _opened(house, scene, index, joint.part, float(far))
     return house
 
 

@@ -107,19 +107,20 @@ def _spray(rng: np.random.Generator, species: Species, *, is_carpet: bool = Fals
         if not is_carpet:
             low, high = np.maximum(low, 0), np.minimum(high, _PX)
         x, y = np.arange(low[0], high[0]) + 0.5, np.arange(low[1], high[1])[:, None] + 0.5
-        u = ((x - tip[0]) * np.cos(angle) + (y - tip[1]) * np.sin(angle)) / (0.5 * long_ * size)
-        v = (-(x - tip[0]) * np.sin(angle) + (y - tip[1]) * np.cos(angle)) / (0.5 * wide * size)
+        x, y, cos, sin = x - tip[0], y - tip[1], np.cos(angle), np.sin(angle)
+        u = (x * cos + y * sin) / (0.5 * long_ * size)
+        v = (-x * sin + y * cos) / (0.5 * wide * size)
         # Pointed at both ends, a light vein along the middle, one half in shade.
         inside = np.abs(v) < 1 - u * u
         share = rng.uniform(0.1, 1.0)
         rgb = np.array(species.dark) * (1 - share) + np.array(species.light) * share
         rgb = rgb * (1 + rng.normal(0, 0.09) * np.array([1.0, 0.0, -0.8]))
+        u, v = u[inside], v[inside]
         shade = np.where(v > 0, 1.0, 0.78) * np.where(np.abs(v) < 0.13, 1.2, 1.0) * (1 - 0.15 * u)
-        columns, rows = np.arange(low[0], high[0]) % _PX, np.arange(low[1], high[1]) % _PX
-        patch = picture[np.ix_(rows, columns)]
-        patch[inside, :3] = shade[inside][:, None] * rgb
-        patch[inside, 3] = 1.0
-        picture[np.ix_(rows, columns)] = patch
+        row, column = np.nonzero(inside)
+        row, column = (row + low[1]) % _PX, (column + low[0]) % _PX
+        picture[row, column, :3] = shade[:, None] * rgb
+        picture[row, column, 3] = 1.0
     return picture[..., :3] if is_carpet else picture
 
 
