@@ -60,14 +60,23 @@ def bin_of(m: Maker, form: int, r: float, tall: float) -> None:
                 m.tube(bent([(x * r * 0.97, tall * 0.9, -0.04), (x * r, tall * 1.12, -0.03),
                     (x * r, tall * 1.12, 0.03), (x * r * 0.97, tall * 0.9, 0.04)], 0.02, n=3),
                     0.005, n=6, of=plain("strap", (0.35, 0.22, 0.13), 0.6))
-        case 9:
-            sorting_bins(m, tall)
+        case 9:  # two bins for sorted waste
+            for x in (-0.115, 0.115):
+                m.box(0.22, tall * 1.25, 0.28, 0.008, x=x, of=plain("bin",
+                    m.pick((0.3, 0.32, 0.33), (0.9, 0.9, 0.89)), 0.5))
+                m.box(0.224, (tall * 1.2502, tall * 1.32), 0.284, 0.006, x=x,
+                    of=plain("lid", m.pick((0.2, 0.4, 0.25), (0.2, 0.3, 0.5), (0.75, 0.6, 0.15),
+                    (0.25, 0.25, 0.26)), 0.5))
         case 10:  # a lid that opens by a touch, over a tall square body
             m.loft(rings(rect, [(1.82 * r, 1.52 * r, 0.02, tall * 1.3 + 0.0002),
                 (1.82 * r, 1.52 * r, 0.02, tall * 1.36), (1.7 * r, 1.4 * r, 0.02, tall * 1.38)],
                 n=3), of=plain("lid", m.pick((0.1, 0.1, 0.1), (0.9, 0.9, 0.88)), 0.4))
-        case 11:
-            half_round_bin(m, r, tall, material)
+        case 11:  # a half round bin for a place at the wall
+            m.loft([(d_shape(1.9 * r, 1.4 * r, back=-0.7 * r), 0.0),
+                (d_shape(2 * r, 1.5 * r, back=-0.75 * r), tall * 1.2)], of=material)
+            m.loft(rings(d_shape, [(2.02 * r, 1.52 * r, -0.76 * r, tall * 1.2 + 0.0002), (2.02 * r,
+                1.52 * r, -0.76 * r, tall * 1.26), (1.7 * r, 1.2 * r, -0.6 * r, tall * 1.36)],
+                column="back"), of=plain("lid", (0.12, 0.12, 0.12), 0.45))
         case 12:  # of slats round a bag
             m.cylinder(0.86 * r, 0.01, tall, n=20, of=plain("bag", (0.86, 0.84, 0.78), 0.95))
             with m.of(m.timber):
@@ -113,25 +122,6 @@ def pedal_bin(m: Maker, r: float, tall: float, form: int, material: Material) ->
     m.box(0.06, (0.004, 0.018), (r * 0.9, r + 0.05), 0.003, of=plain("pedal", (0.1, 0.1, 0.1), 0.5))
     m.box(0.08, (h * 0.82, h * 0.9), (-r - 0.015, -r * 0.9), 0.003,
         of=plain("hinge", (0.1, 0.1, 0.1), 0.5))
-
-
-def sorting_bins(m: Maker, tall: float) -> None:
-    """Two bins for sorted waste."""
-    for x in (-0.115, 0.115):
-        m.box(0.22, tall * 1.25, 0.28, 0.008, x=x, of=plain("bin",
-            m.pick((0.3, 0.32, 0.33), (0.9, 0.9, 0.89)), 0.5))
-        m.box(0.224, (tall * 1.2502, tall * 1.32), 0.284, 0.006, x=x,
-            of=plain("lid", m.pick((0.2, 0.4, 0.25), (0.2, 0.3, 0.5), (0.75, 0.6, 0.15),
-            (0.25, 0.25, 0.26)), 0.5))
-
-
-def half_round_bin(m: Maker, r: float, tall: float, material: Material) -> None:
-    """A half round bin for a place at the wall."""
-    m.loft([(d_shape(1.9 * r, 1.4 * r, back=-0.7 * r), 0.0),
-        (d_shape(2 * r, 1.5 * r, back=-0.75 * r), tall * 1.2)], of=material)
-    m.loft(rings(d_shape, [(2.02 * r, 1.52 * r, -0.76 * r, tall * 1.2 + 0.0002), (2.02 * r,
-        1.52 * r, -0.76 * r, tall * 1.26), (1.7 * r, 1.2 * r, -0.6 * r, tall * 1.36)],
-        column="back"), of=plain("lid", (0.12, 0.12, 0.12), 0.45))
 
 
 def bag_bin(m: Maker, r: float, tall: float) -> None:

@@ -45,8 +45,15 @@ def storage_box(m: Maker) -> None:
             m.tube(bent([(-0.05, h * 0.6, hd), (-0.045, h * 0.52, hd + 0.025),
                 (0.045, h * 0.52, hd + 0.025), (0.05, h * 0.6, hd)], 0.02, n=3), 0.006, n=6,
                 of=plain("strap", (0.35, 0.22, 0.13), 0.7))
-        case 3:
-            slatted_crate(m, w, h, d, grain)
+        case 3:  # a crate of slats
+            with m.of(grain):
+                m.box(w, 0.01, d)
+                for low, high in row(0.012, h + 0.002, 3):
+                    slat = (low, high - 0.012)
+                    m.box(w, slat, 0.01, 0.001, against=-d / 2, mirrored="z")
+                    m.box(0.01, slat, d - 0.0204, 0.001, left=-w / 2, mirrored="x")
+                m.box(0.02, (0.01, h), 0.02, left=0.0102 - w / 2, against=0.0102 - d / 2,
+                    mirrored="xz")
         case 4:  # round, as for hats
             r = 0.42 * d + 0.03
             m.cylinder(r, 0, h * 0.8, n=28, of=card)
@@ -82,17 +89,6 @@ def storage_box(m: Maker) -> None:
                     against=hd - 0.001, of=plain("drawer", shade(colour, 0.92), 0.7))
                 m.revolve([(0, 0), (0.004, 0), (0.008, 0.006), (0, 0.012)], n=10, front=(0,
                     (k + 0.5) * 0.5 * h, hd + 0.0055), of=m.metal)
-
-
-def slatted_crate(m: Maker, w: float, h: float, d: float, grain: Material) -> None:
-    """A crate of slats."""
-    with m.of(grain):
-        m.box(w, 0.01, d)
-        for low, high in row(0.012, h + 0.002, 3):
-            slat = (low, high - 0.012)
-            m.box(w, slat, 0.01, 0.001, against=-d / 2, mirrored="z")
-            m.box(0.01, slat, d - 0.0204, 0.001, left=-w / 2, mirrored="x")
-        m.box(0.02, (0.01, h), 0.02, left=0.0102 - w / 2, against=0.0102 - d / 2, mirrored="xz")
 
 
 def plastic_box(m: Maker, w: float, h: float, d: float, hw: float, colour: Rgb) -> None:

@@ -27,8 +27,16 @@ def clock(m: Maker) -> None:
             with m.moved(at=(0, 0.062, 0)):
                 clock_face(m, 0.055, material)
             m.box(0.07, 0.012, 0.04, of=material)
-        case 2:
-            bell_clock(m, material)
+        case 2:  # a clock with two bells on it
+            with m.moved(at=(0, 0.07, 0)):
+                clock_face(m, 0.055, material)
+            with m.of(material):
+                for x in (-1.0, 1.0):
+                    m.revolve([(0, 0), (0.022, 0), (0.019, 0.012), (0, 0.02)], n=14,
+                        turn=rotation_z(-x * 0.6), at=(x * 0.033, 0.126, 0))
+                    m.tube([(x * 0.025, 0.03, 0), (x * 0.04, 0.0, 0)], 0.004, n=6)
+                m.tube(bent([(-0.03, 0.125, 0), (-0.02, 0.165, 0), (0.02, 0.165, 0), (0.03, 0.125,
+                    0)], 0.02, n=3), 0.003, n=6)
         case 3:  # a wedge
             m.loft([(rect(0.16, 0.08, 0.004, n=2), 0), (rect(0.16, 0.03, 0.004, z=-0.022, n=2),
                 0.075)], sharp=25.0, of=grain)
@@ -40,8 +48,15 @@ def clock(m: Maker) -> None:
                 (0.12, 0.06, 0.004, 0.18), (0.04, 0.05, 0.004, 0.2)], n=2), sharp=25.0, of=grain)
             with m.moved(at=(0, 0.1, 0.022)):
                 clock_face(m, 0.05, m.metal)
-        case 5:
-            domed_clock(m, grain)
+        case 5:  # a clock under a glass dome
+            m.frustum((0.07, 0), (0.068, 0.015), n=24, of=grain)
+            m.revolve([(0, 0.0152), (0.06, 0.0152), (0.06, 0.16), (0.04, 0.2), (0, 0.215)], n=22,
+                of=glass())
+            with m.moved(at=(0, 0.12, 0)):
+                clock_face(m, 0.04, m.metal)
+            for x in (-0.03, 0.03):
+                m.rod(x, (0.014, 0.12), 0, 0.004, of=m.metal)
+            m.cylinder(0.022, 0.03, 0.045, n=14, of=m.metal)
         case 6:  # a cube
             m.box(0.07, 0.07, 0.07, 0.003, of=grain)
             m.box(0.05, (0.02, 0.05), (0.035, 0.0355), of=plain("display", (0.1, 0.12, 0.1), 0.1))
@@ -72,31 +87,6 @@ def clock(m: Maker) -> None:
             with m.moved(at=(0, 0.06, -0.0055)):
                 clock_face(m, 0.04, m.metal)
             m.box(0.12, 0.01, 0.08, 0.002, of=m.metal)
-
-
-def bell_clock(m: Maker, material: Material) -> None:
-    """A clock with two bells on it."""
-    with m.moved(at=(0, 0.07, 0)):
-        clock_face(m, 0.055, material)
-    with m.of(material):
-        for x in (-1.0, 1.0):
-            m.revolve([(0, 0), (0.022, 0), (0.019, 0.012), (0, 0.02)], n=14,
-                turn=rotation_z(-x * 0.6), at=(x * 0.033, 0.126, 0))
-            m.tube([(x * 0.025, 0.03, 0), (x * 0.04, 0.0, 0)], 0.004, n=6)
-        m.tube(bent([(-0.03, 0.125, 0), (-0.02, 0.165, 0), (0.02, 0.165, 0), (0.03, 0.125, 0)],
-            0.02, n=3), 0.003, n=6)
-
-
-def domed_clock(m: Maker, grain: Material) -> None:
-    """A clock under a glass dome."""
-    m.frustum((0.07, 0), (0.068, 0.015), n=24, of=grain)
-    m.revolve([(0, 0.0152), (0.06, 0.0152), (0.06, 0.16), (0.04, 0.2), (0, 0.215)], n=22,
-        of=glass())
-    with m.moved(at=(0, 0.12, 0)):
-        clock_face(m, 0.04, m.metal)
-    for x in (-0.03, 0.03):
-        m.rod(x, (0.014, 0.12), 0, 0.004, of=m.metal)
-    m.cylinder(0.022, 0.03, 0.045, n=14, of=m.metal)
 
 
 def carriage_clock(m: Maker) -> None:

@@ -330,8 +330,18 @@ def hung_lamp(m: Maker, size: Size, material: Material, fabric: Material) -> Non
             ball_cluster(m, h, d, r, material)
         case 7:
             arm_chandelier(m, r, low, material)
-        case 8:
-            bar_lamp(m, h, d, r, low, material)
+        case 8:  # a bar with three shades
+            m.box(2 * r, (low - 0.02, low), 0.024, 0.002, of=material)
+            for x in (-0.5, 0.5):
+                m.tube([(x * r, low - 0.002, 0.0), (0.0, h - 0.026, 0.0)], 0.002, n=5, of=material)
+            for x in (-0.72, 0.0, 0.72):
+                with m.moved(at=(x * r, 0.0, 0.0)):
+                    m.rod(0.0, (0.5 * low, low - 0.018), 0.0, 0.003, n=5, of=RUBBER)
+                    m.revolve([(0.075, 0.0), (0.06, 0.3 * low), (0.015, 0.55 * low), (0.0,
+                        0.55 * low), (0.0, 0.53 * low), (0.013, 0.53 * low), (0.057, 0.3 * low),
+                        (0.072, 0.0), (0.075, 0.0)], n=20, of=material)
+                    m.sphere((0.0, 0.2 * low, 0.0), 0.03, n=10, of=OPAL)
+            m.cylinder(d / 2, h - 0.012, h - 0.001, n=24, of=material)
         case 9:  # leaves of a flower: three plates over each other
             for k in range(3):
                 q, y = r * (1.0 - 0.24 * k), 0.1 * low + 0.3 * low * k
@@ -379,21 +389,6 @@ def arm_chandelier(m: Maker, r: float, low: float, material: Material) -> None:
         m.revolve([(0.0, 0.505 * low), (0.014, 0.505 * low), (0.02, 0.65 * low), (0.0, 0.85 * low)],
             n=12, at=polar(r - 0.03, 0.0, a), of=OPAL)
     m.revolve([(0.0, 0.0), (0.012, 0.006), (0.0, 0.3 * low)], n=10, of=material)
-
-
-def bar_lamp(m: Maker, h: float, d: float, r: float, low: float, material: Material) -> None:
-    """A bar with three shades."""
-    m.box(2 * r, (low - 0.02, low), 0.024, 0.002, of=material)
-    for x in (-0.5, 0.5):
-        m.tube([(x * r, low - 0.002, 0.0), (0.0, h - 0.026, 0.0)], 0.002, n=5, of=material)
-    for x in (-0.72, 0.0, 0.72):
-        with m.moved(at=(x * r, 0.0, 0.0)):
-            m.rod(0.0, (0.5 * low, low - 0.018), 0.0, 0.003, n=5, of=RUBBER)
-            m.revolve([(0.075, 0.0), (0.06, 0.3 * low), (0.015, 0.55 * low), (0.0, 0.55 * low),
-                (0.0, 0.53 * low), (0.013, 0.53 * low), (0.057, 0.3 * low), (0.072, 0.0),
-                (0.075, 0.0)], n=20, of=material)
-            m.sphere((0.0, 0.2 * low, 0.0), 0.03, n=10, of=OPAL)
-    m.cylinder(d / 2, h - 0.012, h - 0.001, n=24, of=material)
 
 
 @catalogued()
