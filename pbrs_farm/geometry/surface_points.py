@@ -104,11 +104,16 @@ class _Grids(NamedTuple):
         self, which: NDArray[np.int64], column: NDArray[np.int64], row: NDArray[np.int64]
     ) -> F64:
         u, v = (column + 0.5) / self.n_u[which], (row + 0.5) / self.n_v[which]
-        points = np.empty((len(which), 3))
-        for axis in range(3):
-            p, q, r = (end[:, axis][which] for end in (*self.base, self.apex))
-            points[:, axis] = (p * (1 - u) + q * u) * (1 - v) + r * v
-        return points
+        # Coordinate by coordinate and in place: in less than half the time of whole points.
+        ends = (np.ascontiguousarray(end.T) for end in (*self.base, self.apex))
+        p, q, r = (end.take(which, 1) for end in ends)
+        p *= 1 - u
+        q *= u
+        p += q
+        p *= 1 - v
+        r *= v
+        p += r
+        return np.ascontiguousarray(p.T)
 
 
 def _grids(corners: F64, spacing_m: float) -> _Grids:
