@@ -8,6 +8,7 @@ travels to every worker. commands/options.py makes the command line. No effects.
 from __future__ import annotations
 
 from collections.abc import Iterable
+from functools import partial
 from pathlib import Path
 from typing import Annotated, Final, Literal
 
@@ -21,21 +22,27 @@ from pbrs_farm.core.recipe import CAMERA_SOURCES, RECIPE_NAMES
 from pbrs_farm.core.record import Record
 from pbrs_farm.core.shown_text import hint_of_choice
 
+# Options under one title in the help.
+_dressing_option = partial(option, group="dressing")
+_recipe_option = partial(option, group="recipe")
+_light_option = partial(option, group="light")
+_viewpoints_option = partial(option, group="viewpoints")
+_output_option = partial(option, group="output")
+_processes_option = partial(option, group="processes")
+
 
 class LibraryOptions(Record):
     """Libraries for dressing beside the furniture package."""
 
-    catalogue: tuple[str, ...] = option(
+    catalogue: tuple[str, ...] = _dressing_option(
         (),
         "add a furniture library, repeatable: .sh3f (models), .sh3t (textures), a folder of OBJ or GLB,"
         " 3D-FUTURE, hssd-models or objathor; `generated` omits the furniture package",
-        group="dressing",
         metavar="LIBRARY",
     )
-    pictures: tuple[str, ...] = option(
+    pictures: tuple[str, ...] = _dressing_option(
         (),
         "folder of JPEG or PNG files to hang as pictures on walls, repeatable",
-        group="dressing",
         metavar="DIR",
         into="catalogue",
     )
@@ -44,16 +51,14 @@ class LibraryOptions(Record):
 class DressOptions(Record):
     """By which seeds each home is dressed, and with what."""
 
-    dress: str | None = option(
+    dress: str | None = _dressing_option(
         None,
         "seeds for dressing; each gives one more variant of each home: 3, 1..20 or 1,4,7",
-        group="dressing",
         metavar="SEEDS",
     )
-    furnish: Literal["none", "empty", "sparse"] | None = option(
+    furnish: Literal["none", "empty", "sparse"] | None = _dressing_option(
         None,
         "before dressing, furnish rooms without furniture (empty) or with little (sparse) (docs/homes.md)",
-        group="dressing",
         sets="dress.furnish",
     )
 
@@ -61,45 +66,42 @@ class DressOptions(Record):
 class RecipeOptions(Record):
     """The recipe by name, and what overrides its fields."""
 
-    recipe: str = option(
-        "fast", f"{', '.join(RECIPE_NAMES)}, or a FILE.toml (default {{default}})", group="recipe"
+    recipe: str = _recipe_option(
+        "fast", f"{', '.join(RECIPE_NAMES)}, or a FILE.toml (default {{default}})"
     )
-    set: tuple[str, ...] = option(
-        (), "override a field; `recipes` lists them", group="recipe", metavar="GROUP.FIELD=VALUE"
+    set: tuple[str, ...] = _recipe_option(
+        (), "override a field; `recipes` lists them", metavar="GROUP.FIELD=VALUE"
     )
-    size: str | None = option(None, "picture size, e.g. 640x480", group="recipe", metavar="WxH")
-    strict: bool = option(False, "treat recoverable faults of a home as errors", group="recipe")
+    size: str | None = _recipe_option(None, "picture size, e.g. 640x480", metavar="WxH")
+    strict: bool = _recipe_option(False, "treat recoverable faults of a home as errors")
 
 
 class SeededRecipeOptions(RecipeOptions):
     """As RecipeOptions, with the recipe's seed."""
 
-    seed: int | None = option(None, "seed of the recipe (default 0)", group="recipe", sets="seed")
+    seed: int | None = _recipe_option(None, "seed of the recipe (default 0)", sets="seed")
 
 
 class LightOptions(Record):
     """Duration of light and its stored groups: short forms of the recipe's fields."""
 
-    noise: str | None = option(
+    noise: str | None = _light_option(
         None,
         "stop the light of a view at this estimated relative error, e.g. 0.05 (light.noise):"
         " path adds samples, metropolis does fewer mutations",
-        group="light",
         metavar="E",
         sets="light.noise",
     )
-    time_budget: str | None = option(
+    time_budget: str | None = _light_option(
         None,
         "seconds of light per view, instead of a number of samples or mutations (light.time_budget_s)",
-        group="light",
         metavar="S",
         sets="light.time_budget_s",
     )
-    groups: Literal["two", "lamps"] | None = option(
+    groups: Literal["two", "lamps"] | None = _light_option(
         None,
         "lamps: also store the light of each lamp, for `relight VIEW --lamp` (light.groups;"
         " path only; default two: outdoor and indoor)",
-        group="light",
         sets="light.groups",
     )
 
@@ -107,51 +109,36 @@ class LightOptions(Record):
 class CameraOptions(Record):
     """Where viewpoints come from."""
 
-    cameras: str | None = option(
+    cameras: str | None = _viewpoints_option(
         None,
         f"source of the viewpoints: {', '.join(CAMERA_SOURCES.names())} (docs/cameras.md)",
-        group="viewpoints",
         metavar="SOURCE",
         sets="cameras.source",
     )
-    trajectory: Path | None = option(
+    trajectory: Path | None = _viewpoints_option(
         None,
         "follow this path: rows of TUM's format, t x y z qx qy qz qw (docs/motion.md)",
-        group="viewpoints",
         metavar="FILE",
     )
-    frames: int | None = option(
-        None,
-        "number of frames of a walk (default 150)",
-        group="viewpoints",
-        metavar="N",
-        sets="cameras.walk_frames",
+    frames: int | None = _viewpoints_option(
+        None, "number of frames of a walk (default 150)", metavar="N", sets="cameras.walk_frames"
     )
-    fps: float | None = option(
-        None,
-        "frames per second of a walk (default 30)",
-        group="viewpoints",
-        metavar="F",
-        sets="cameras.walk_fps",
+    fps: float | None = _viewpoints_option(
+        None, "frames per second of a walk (default 30)", metavar="F", sets="cameras.walk_fps"
     )
-    doors: Literal["drawn", "open"] | None = option(
+    doors: Literal["drawn", "open"] | None = _viewpoints_option(
         None,
         "open: open the doors between rooms if their model has a hinge (read.doors; default drawn)",
-        group="viewpoints",
         sets="read.doors",
     )
-    stereo: float | None = option(
+    stereo: float | None = _viewpoints_option(
         None,
         "add a second view B metres to the right of each, e.g. 0.065",
-        group="viewpoints",
         metavar="B",
         sets="cameras.stereo_m",
     )
-    rig: Path | None = option(
-        None,
-        "take each view with the cameras of this rig.toml (docs/cameras.md)",
-        group="viewpoints",
-        metavar="FILE",
+    rig: Path | None = _viewpoints_option(
+        None, "take each view with the cameras of this rig.toml (docs/cameras.md)", metavar="FILE"
     )
 
 
@@ -187,44 +174,38 @@ class Wanted(Record):
         'opengl_dl'
     """
 
-    modes: Annotated[tuple[Mode, ...], BeforeValidator(_modes)] = option(
+    modes: Annotated[tuple[Mode, ...], BeforeValidator(_modes)] = _output_option(
         ALL_MODES,
         "lighting modes: opengl_dl opengl_il mlt_ol mlt_il_ol (default all)",
-        group="output",
         metavar="MODE",
         many_words=True,
     )
-    layers: tuple[str, ...] = option(
+    layers: tuple[str, ...] = _output_option(
         (),
         "optional layers to add to the default ones; `layers` lists them",
-        group="output",
         metavar="LAYER",
         many_words=True,
     )
-    n_views: int = option(
+    n_views: int = _output_option(
         0,
         "at most N views per home (default: all)",
         ge=0,
         name="views",
-        group="output",
         metavar="N",
         least=1,
         hint="omit it for all views",
     )
-    pairs: bool = option(
+    pairs: bool = _output_option(
         False,
         "write pairs.parquet: overlap and relative pose of each two views of a room (docs/motion.md)",
-        group="output",
     )
-    tracks: bool = option(
+    tracks: bool = _output_option(
         False,
         "write tracks.npz: surface points tracked through the frames of a walk (docs/motion.md)",
-        group="output",
     )
-    drop_radiance: bool = option(
+    drop_radiance: bool = _output_option(
         False,
         "remove each finished view's radiance.exr, most of its bytes, which `relight` and --update read",
-        group="output",
     )
 
 
@@ -244,39 +225,33 @@ def wanted_of(request: Wanted) -> Wanted:
 class ProcessLimitOptions(Record):
     """Number and limits of the processes of a run on this machine."""
 
-    jobs: int = option(
+    jobs: int = _processes_option(
         1,
         "render processes (default 1, plus one for all steps but light); each view uses all cores",
-        group="processes",
         metavar="N",
         least=1,
     )
-    step_timeout: float = option(
-        3600.0, "time limit of a step, seconds (default 3600)", group="processes", metavar="S"
+    step_timeout: float = _processes_option(
+        3600.0, "time limit of a step, seconds (default 3600)", metavar="S"
     )
-    silence: float = option(
+    silence: float = _processes_option(
         0.0,
         "restart a process without a sign of life for S seconds (default: as --step-timeout)",
-        group="processes",
         metavar="S",
         least=0,
     )
-    memory: float = option(
-        0.0,
-        "memory limit of a process (default: its share of the machine)",
-        group="processes",
-        metavar="MB",
-        least=0,
+    memory: float = _processes_option(
+        0.0, "memory limit of a process (default: its share of the machine)", metavar="MB", least=0
     )
 
 
 class ProcessOptions(ProcessLimitOptions):
     """How this machine's processes do a run."""
 
-    update: bool = option(
-        False, "replace the recipe of the output folder; repeat changed steps", group="processes"
+    update: bool = _processes_option(
+        False, "replace the recipe of the output folder; repeat changed steps"
     )
-    as_json: bool = option(False, "print a JSON line per event", name="json", group="processes")
+    as_json: bool = _processes_option(False, "print a JSON line per event", name="json")
 
 
 class Request(Wanted, LightOptions, SeededRecipeOptions, LibraryOptions, DressOptions):

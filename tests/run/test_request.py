@@ -24,8 +24,8 @@ from pathlib import Path
 from types import ModuleType
 
 text = Path(sys.argv[1]).read_text()
-new = """    pairs: bool = option("""
-added = """    n_dogs: int = option(0, "dogs a house", name="dogs", group="output", least=1)
+new = """    pairs: bool = _output_option("""
+added = """    n_dogs: int = _output_option(0, "dogs a house", name="dogs", least=1)
 """
 assert new in text
 module = ModuleType("pbrs_farm.run.request")
