@@ -11,6 +11,7 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from enum import StrEnum
 from typing import Final, TypeVar
+from weakref import WeakKeyDictionary
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,7 +120,7 @@ class Material:
         return self.kind in (MaterialKind.OPAQUE, MaterialKind.MIRROR, MaterialKind.SHADE)
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, slots=True, eq=False, weakref_slot=True)
 class Surface:
     """A triangle mesh of one material."""
 
@@ -131,8 +132,19 @@ class Surface:
     normals: F32 | None = None  # (V, 3) unit shading normals; None = flat
     part: str = ""  # moving part of its item (Joint.part); "" = the static body
 
+    @property
+    def bounds(self) -> F64:
+        """(2, 3) minimum and maximum of its vertices, computed once; ValueError without any."""
+        ends = _BOUNDS.get(self)
+        if ends is None:
+            ends = _BOUNDS[self] = np.array(points_bounds(self.positions))
+        return ends
+
     def __repr__(self) -> str:
         return f"Surface({self.name!r}, {len(self.faces):,} triangles, material {self.material})"
+
+
+_BOUNDS: Final = WeakKeyDictionary[Surface, F64]()
 
 
 def corners_of_surfaces(surfaces: Iterable[Surface]) -> F64:
@@ -250,11 +262,10 @@ class Item:
 
     @property
     def bounds(self) -> F64:
-        """(2, 3) axis-aligned minimum and maximum of all vertices, metres; NaN without any. Not cached."""
-        points = [s.positions for s in self.surfaces if len(s.positions)]
-        if not points:
+        """(2, 3) axis-aligned minimum and maximum of all vertices, metres; NaN without any."""
+        ends = np.array([s.bounds for s in self.surfaces if len(s.positions)]).reshape(-1, 2, 3)
+        if not len(ends):
             return np.full((2, 3), np.nan)
-        ends = np.array([points_bounds(p) for p in points])
         return np.array([ends[:, 0].min(0), ends[:, 1].max(0)])
 
     @property

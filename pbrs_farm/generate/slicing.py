@@ -103,17 +103,22 @@ def _annealed(brief: Brief, draw: _Random, n_moves: int) -> tuple[list[IntRect],
     tree = _spine_tree(brief, draw)
     rules = Rules(brief)
     rects = _lay_out_tree(tree, brief)
-    cost, unmet = rules.judge(rects)
+    cost, unmet = rules.judge(rects) or (math.inf, 0)
     best, best_score = rects, (unmet, cost)
+
+    def most() -> float:
+        """Maximum accepted cost of a move that is worse."""
+        return cost - temperature * math.log(draw() or 1e-300)
+
     cooling = (_T_END / _T_START) ** (1 / n_moves)
     temperature = _T_START
     for _ in range(n_moves):
         temperature *= cooling
         moved = _neighbour_tree(tree, draw)
         new_rects = _lay_out_tree(moved, brief)
-        new_cost, unmet = rules.judge(new_rects)
-        if new_cost <= cost or draw() < math.exp((cost - new_cost) / temperature):
-            tree, cost = moved, new_cost
+        judged = rules.judge(new_rects, cost, most)
+        if judged is not None:
+            tree, (cost, unmet) = moved, judged
             if (unmet, cost) < best_score:
                 best, best_score = new_rects, (unmet, cost)
                 if cost < _GOOD:

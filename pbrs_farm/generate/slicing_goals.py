@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Final
 
@@ -74,9 +74,16 @@ class Rules:
             i for i, leaf in enumerate(brief.leaves) if leaf.is_corner or leaf.is_court
         ]
 
-    def judge(self, rects: list[IntRect]) -> tuple[float, int]:
-        """(smooth cost, number of violated hard rules) of a rectangle, in steps of STEP_M, for each leaf."""
+    def judge(
+        self, rects: list[IntRect], good: float = math.inf, most: Callable[[], float] = lambda: 0.0
+    ) -> tuple[float, int] | None:
+        """(smooth cost, number of violated hard rules) of a rectangle, in steps of STEP_M, for each leaf.
+
+        None as soon as the cost exceeds both `good` and the result of `most`, which is called once, and only if the
+        cost exceeds `good`.
+        """
         total, unmet = 0.0, 0
+        limit, is_final = good, False
         for leaf, (min_width, max_aspect, has_place), rect in zip(
             self._brief.leaves, self._limits, rects, strict=True
         ):
@@ -100,6 +107,10 @@ class Rules:
             if missing > 0:
                 total += _UNMET + missing
                 unmet += 1
+            if total > limit and not is_final:
+                limit, is_final = most(), True
+            if total > limit:
+                return None
         for leaf_number, partners, length, is_hard in self._contacts:
             rect, missing = rects[leaf_number], math.inf
             for partner in partners:
@@ -109,6 +120,10 @@ class Rules:
             if missing > 0:
                 total += _UNMET + missing if is_hard else 0.2 + 0.3 * min(missing, 2.0)
                 unmet += is_hard
+                if total > limit and not is_final:
+                    limit, is_final = most(), True
+                if total > limit:
+                    return None
         return total, unmet
 
     def _missing_place(self, leaf: SliceLeaf, rect: IntRect, rects: list[IntRect]) -> float:

@@ -12,11 +12,10 @@ from itertools import pairwise
 
 import numpy as np
 import shapely
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 
 from pbrs_farm.core.arrays import F64, Bools
 from pbrs_farm.core.house import Room
+from pbrs_farm.geometry.connected import connected_nodes
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.planar_surfaces import Cover
 from pbrs_farm.repair.structure.prisms import polygons_of
@@ -72,10 +71,8 @@ def spaces_of_rooms(
         why = [reason for _, reason in openings if reason]
         if why:
             reasons[i] = "; ".join(why)
-    # Connect the rooms by their links; one link of a room to itself keeps the array 2-d.
-    rows, columns = np.array([*links, (0, 0)]).T if rooms else (np.zeros(0, int),) * 2
-    graph = coo_array((np.ones(len(rows), np.int8), (rows, columns)), shape=(len(rooms),) * 2)
-    labels = connected_components(graph, directed=False)[1] if rooms else np.zeros(0, int)
+    # Connect the rooms by their links.
+    labels = connected_nodes(*np.array(links, int).reshape(-1, 2).T, len(rooms))
     members = [np.flatnonzero(labels == k).tolist() for k in dict.fromkeys(labels.tolist())]
     return tuple(
         Space(

@@ -8,12 +8,11 @@ each is dissolved instead: the triangle across its longest edge is split at that
 from __future__ import annotations
 
 import numpy as np
-from scipy.sparse import coo_array
-from scipy.sparse.csgraph import connected_components
 from scipy.spatial import KDTree
 
 from pbrs_farm.core.arrays import F64, I64
 from pbrs_farm.core.mesh import face_areas, numbered_points
+from pbrs_farm.geometry.connected import connected_nodes
 
 MIN_AREA_M2 = 1e-12  # a triangle of less is a sliver: float32 holds no smaller one
 _MERGE_M = 4e-6  # a few steps of float32 ten metres from the origin
@@ -46,8 +45,7 @@ def _representatives(positions: F64) -> I64:
     # Take for each point the first of those linked to it by steps below _MERGE_M.
     n = len(positions)
     pairs = KDTree(positions).query_pairs(_MERGE_M, output_type="ndarray").reshape(-1, 2)
-    graph = coo_array((np.ones(len(pairs), np.int8), (pairs[:, 0], pairs[:, 1])), shape=(n, n))
-    cluster = connected_components(graph, directed=False)[1]
+    cluster = connected_nodes(pairs[:, 0], pairs[:, 1], n)
     return np.unique(cluster, return_index=True)[1].astype(np.int64)[cluster]
 
 
