@@ -30,7 +30,7 @@ from pbrs_farm.core.house import House
 from pbrs_farm.core.made_home import VERSION, MadeHome
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.formats.house_bundle import bundle_from_house
-from pbrs_farm.generate.drawn_home import drawn_home
+from pbrs_farm.generate.generated_home import drawn_home
 from pbrs_farm.geometry.plan_surfaces import room_shape
 from pbrs_farm.prepare.dress_catalogue import catalogue_of_words
 from pbrs_farm.prepare.finished_house import finished_house

@@ -197,6 +197,10 @@ class HomeContents:
         return buffer.getvalue()
 
 
+def _added(parent: ET.Element, tag: str, **attributes: str) -> ET.Element:
+    return ET.SubElement(parent, tag, attributes)
+
+
 def _cm(metres: float) -> str:
     return f"{metres * 100:.2f}".rstrip("0").rstrip(".")
 
@@ -215,19 +219,17 @@ def _add_properties(home: ET.Element, pieces: list[PlacedPiece], origin: str) ->
     if credits:
         rows["Models"] = credits
     for key, value in rows.items():
-        ET.SubElement(home, "property", {"name": key, "value": value})
+        _added(home, "property", name=key, value=value)
 
 
 def _add_surroundings(home: ET.Element, plan: Plan) -> None:
-    ET.SubElement(
+    _added(
         home,
         "environment",
-        {
-            "groundColor": "00A8A8A8",
-            "skyColor": "00CCE4FC",
-            "lightColor": "00D0D0D0",
-            "ceillingLightColor": "00D0D0D0",
-        },
+        groundColor="00A8A8A8",
+        skyColor="00CCE4FC",
+        lightColor="00D0D0D0",
+        ceillingLightColor="00D0D0D0",
     )
     xs = [p for wall in plan.walls for p in (wall.start[0], wall.end[0])]
     zs = [p for wall in plan.walls for p in (wall.start[1], wall.end[1])]
@@ -238,20 +240,18 @@ def _add_surroundings(home: ET.Element, plan: Plan) -> None:
         ("observerCamera", (x0 + x1) / 2, (z0 + z1) / 2, _EYE_M, 0.14),
         ("topCamera", middle[0], middle[1] + size * 0.6, size * 1.1, 0.9),
     ):
-        ET.SubElement(
+        _added(
             home,
             "observerCamera" if tag[0] == "o" else "camera",
-            {
-                "attribute": tag,
-                "x": _cm(x),
-                "y": _cm(z),
-                "z": _cm(y),
-                "yaw": f"{math.pi:.6f}",
-                "pitch": f"{pitch:g}",
-                "fieldOfView": f"{_FIELD_OF_VIEW_RAD:g}",
-                "lens": "PINHOLE",
-                "time": "1700000000000",
-            },
+            attribute=tag,
+            x=_cm(x),
+            y=_cm(z),
+            z=_cm(y),
+            yaw=f"{math.pi:.6f}",
+            pitch=f"{pitch:g}",
+            fieldOfView=f"{_FIELD_OF_VIEW_RAD:g}",
+            lens="PINHOLE",
+            time="1700000000000",
         )
 
 
@@ -265,17 +265,15 @@ def _add_levels(
     levels, elevation = [], 0.0
     for number, storey in enumerate(storeys):
         name = f"level-{number}"
-        ET.SubElement(
+        _added(
             home,
             "level",
-            {
-                "id": name,
-                "name": (*_LEVEL_NAMES, f"Floor {number}")[min(number, 2)],
-                "elevation": _cm(elevation),
-                "floorThickness": _cm(slab),
-                "height": _cm(storey.plan.height),
-                "elevationIndex": "0",
-            },
+            id=name,
+            name=(*_LEVEL_NAMES, f"Floor {number}")[min(number, 2)],
+            elevation=_cm(elevation),
+            floorThickness=_cm(slab),
+            height=_cm(storey.plan.height),
+            elevationIndex="0",
         )
         levels.append({"level": name})
         elevation += storey.plan.height + slab
@@ -288,26 +286,24 @@ def _add_stairs(
     shape = staircase(stair, rise, paints.design.colour)
     (x, z), (low, high) = stair.middle, shape.bounds
     width, height, depth = (high - low).tolist()
-    return ET.SubElement(
+    return _added(
         home,
         "pieceOfFurniture",
-        {
-            "id": f"pieceOfFurniture-{len(home)}",
-            "name": "Staircase",
-            "catalogId": "pbrs_farm#staircase",
-            "creator": AUTHOR,
-            "icon": contents.icon,
-            "model": contents.model("staircase", shape),
-            "x": _cm(x),
-            "y": _cm(z),
-            "elevation": "0",
-            "angle": f"{stair.angle_rad:.6f}",
-            "width": _cm(width),
-            "depth": _cm(depth),
-            "height": _cm(height),
-            "movable": "false",
-            "staircaseCutOutShape": "M0,0 v1 h1 v-1 z",
-        },
+        id=f"pieceOfFurniture-{len(home)}",
+        name="Staircase",
+        catalogId="pbrs_farm#staircase",
+        creator=AUTHOR,
+        icon=contents.icon,
+        model=contents.model("staircase", shape),
+        x=_cm(x),
+        y=_cm(z),
+        elevation="0",
+        angle=f"{stair.angle_rad:.6f}",
+        width=_cm(width),
+        depth=_cm(depth),
+        height=_cm(height),
+        movable="false",
+        staircaseCutOutShape="M0,0 v1 h1 v-1 z",
     )
 
 
@@ -328,28 +324,26 @@ def _add_opening(
         f"{opening.kind} {opening.width} {opening.height} {wall.thickness} {opening.hinge_at_start}"
         f" {door_form(paints.design, rooms)}"
     )
-    element = ET.SubElement(
+    element = _added(
         home,
         "doorOrWindow",
-        {
-            "id": f"doorOrWindow-{len(home)}",
-            "name": _DOOR_NAMES[opening.kind],
-            "catalogId": f"pbrs_farm#{opening.kind.value}",
-            "creator": AUTHOR,
-            "icon": contents.icon,
-            "model": contents.model(key, shape),
-            "x": _cm(x),
-            "y": _cm(z),
-            "elevation": _cm(opening.sill),
-            "angle": f"{angle:.6f}",
-            "width": _cm(opening.width),
-            "depth": _cm(float(high[2] - low[2])),
-            "height": _cm(opening.height),
-            "movable": "false",
-            "wallThickness": "1",
-            "wallDistance": "0",
-            "boundToWall": "true",
-        },
+        id=f"doorOrWindow-{len(home)}",
+        name=_DOOR_NAMES[opening.kind],
+        catalogId=f"pbrs_farm#{opening.kind.value}",
+        creator=AUTHOR,
+        icon=contents.icon,
+        model=contents.model(key, shape),
+        x=_cm(x),
+        y=_cm(z),
+        elevation=_cm(opening.sill),
+        angle=f"{angle:.6f}",
+        width=_cm(opening.width),
+        depth=_cm(float(high[2] - low[2])),
+        height=_cm(opening.height),
+        movable="false",
+        wallThickness="1",
+        wallDistance="0",
+        boundToWall="true",
     )
     _add_joints(element, shape)
     return element
@@ -359,7 +353,7 @@ def _add_joints(element: ET.Element, shape: Shape) -> None:
     """The joints of a model in its own frame, for readers that open its doors and drawers."""
     if shape.joints:
         value = keys.canonical_json(json_from_value(shape.joints))
-        ET.SubElement(element, "property", {"name": JOINTS_PROPERTY, "value": value})
+        _added(element, "property", name=JOINTS_PROPERTY, value=value)
 
 
 def _angle_into(plan: Plan, opening: PlanOpening, wall: PlanWall) -> float:
@@ -386,26 +380,24 @@ def _add_piece(
     if shape is None:
         return
     is_light = bool(shape.lights) or piece.group.endswith("_lamp")
-    element = ET.SubElement(
+    element = _added(
         home,
         "light" if is_light else "pieceOfFurniture",
-        {
-            "id": f"pieceOfFurniture-{len(home)}",
-            "name": piece.name,
-            "catalogId": piece.id,
-            "creator": piece.creator or piece.library or AUTHOR,
-            "license": piece.licence,
-            "icon": contents.icon,
-            "model": contents.model(piece.id, shape),
-            "x": _cm(placed.x),
-            "y": _cm(placed.z),
-            "angle": f"{placed.angle_rad:.6f}",
-            "elevation": _cm(min(placed.elevation, height - placed.height)),
-            "width": _cm(placed.width),
-            "depth": _cm(placed.depth),
-            "height": _cm(placed.height),
-        }
-        | level,
+        id=f"pieceOfFurniture-{len(home)}",
+        name=piece.name,
+        catalogId=piece.id,
+        creator=piece.creator or piece.library or AUTHOR,
+        license=piece.licence,
+        icon=contents.icon,
+        model=contents.model(piece.id, shape),
+        x=_cm(placed.x),
+        y=_cm(placed.z),
+        angle=f"{placed.angle_rad:.6f}",
+        elevation=_cm(min(placed.elevation, height - placed.height)),
+        width=_cm(placed.width),
+        depth=_cm(placed.depth),
+        height=_cm(placed.height),
+        **level,
     )
     _add_joints(element, shape)
     if placed.mirrored:
@@ -426,20 +418,18 @@ def _add_light_sources(element: ET.Element, shape: Shape) -> None:
     points = [np.asarray(light.position) for light in shape.lights]
     for point in points or [(low + high) / 2]:
         x, y, z = (point - low) / size
-        ET.SubElement(
+        _added(
             element,
             "lightSource",
-            {
-                "x": f"{x:.4f}",
-                "y": f"{1 - z:.4f}",
-                "z": f"{y:.4f}",
-                "color": "00FFE8CC",
-                "diameter": f"{min(0.065 / size[0], 1.0):.4f}",
-            },
+            x=f"{x:.4f}",
+            y=f"{1 - z:.4f}",
+            z=f"{y:.4f}",
+            color="00FFE8CC",
+            diameter=f"{min(0.065 / size[0], 1.0):.4f}",
         )
     for number, material in enumerate(shape.materials):
         if material.kind is MaterialKind.BULB:
-            ET.SubElement(element, "lightSourceMaterial", {"name": material_name(shape, number)})
+            _added(element, "lightSourceMaterial", name=material_name(shape, number))
 
 
 def _add_walls(home: ET.Element, plan: Plan, paints: Paints, level: dict[str, str]) -> None:
@@ -450,20 +440,18 @@ def _add_walls(home: ET.Element, plan: Plan, paints: Paints, level: dict[str, st
         (x0, z0), (x1, z1) = wall.start, wall.end
         level_top = wall.height or plan.height
         tops = [height for _, height in wall.tops] or [level_top, level_top]
-        element = ET.SubElement(
+        element = _added(
             home,
             "wall",
-            {
-                "id": f"wall-{first + number}",
-                "xStart": _cm(x0),
-                "yStart": _cm(z0),
-                "xEnd": _cm(x1),
-                "yEnd": _cm(z1),
-                "height": _cm(tops[0]),
-                "thickness": _cm(wall.thickness),
-                "pattern": "hatchUp",
-            }
-            | level,
+            id=f"wall-{first + number}",
+            xStart=_cm(x0),
+            yStart=_cm(z0),
+            xEnd=_cm(x1),
+            yEnd=_cm(z1),
+            height=_cm(tops[0]),
+            thickness=_cm(wall.thickness),
+            pattern="hatchUp",
+            **level,
         )
         if tops[1] != tops[0]:
             element.set("heightAtEnd", _cm(tops[1]))
@@ -555,32 +543,28 @@ def _add_rooms(
         is_well = has_stair and room.type is RoomType.STAIRS
         open_at = _OPEN_WELLS.get(level.get("level", "")) if is_well else ""
         has_ceiling = room.type is not RoomType.BALCONY and open_at != "ceiling"
-        element = ET.SubElement(
+        element = _added(
             home,
             "room",
-            {
-                "id": f"room-{first + number}",
-                "name": room.name,
-                "floorVisible": str(open_at != "floor").lower(),
-                "ceilingVisible": str(has_ceiling).lower(),
-                "floorColor": f"FF{paints.wet_floor if is_wet else paints.floor}",
-                "ceilingColor": f"FF{paints.ceiling}",
-                "areaVisible": "true",
-            }
-            | level,
+            id=f"room-{first + number}",
+            name=room.name,
+            floorVisible=str(open_at != "floor").lower(),
+            ceilingVisible=str(has_ceiling).lower(),
+            floorColor=f"FF{paints.wet_floor if is_wet else paints.floor}",
+            ceilingColor=f"FF{paints.ceiling}",
+            areaVisible="true",
+            **level,
         )
         picture = floors.get(_FLOOR_GROUPS.get(room.type, _DRY_FLOOR))
         if picture is not None:
-            ET.SubElement(
+            _added(
                 element,
                 "texture",
-                {
-                    "attribute": "floorTexture",
-                    "name": picture.texture.name,
-                    "width": _cm(picture.size[0]),
-                    "height": _cm(picture.size[1]),
-                    "image": contents.picture(picture),
-                },
+                attribute="floorTexture",
+                name=picture.texture.name,
+                width=_cm(picture.size[0]),
+                height=_cm(picture.size[1]),
+                image=contents.picture(picture),
             )
         for x, z in room.polygon:
-            ET.SubElement(element, "point", {"x": _cm(x), "y": _cm(z)})
+            _added(element, "point", x=_cm(x), y=_cm(z))

@@ -27,7 +27,7 @@ from pbrs_farm.repair.small_repairs import (
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.added_ceilings import rooms_with_added_ceilings
 from pbrs_farm.repair.structure.frames_apart import with_frames_apart, with_parts_apart
-from pbrs_farm.repair.structure.undersides import with_undersides
+from pbrs_farm.repair.structure.slabs import with_undersides
 from pbrs_farm.repair.structure.watertight import Structure, repaired_structure, with_structure
 
 

@@ -9,7 +9,7 @@ import numpy as np
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.camera import Camera, Intrinsics, View
-from pbrs_farm.geometry.icosphere import icosphere_mesh
+from pbrs_farm.geometry.solids import icosphere_mesh
 
 N_VIEWS: Final = 20  # per object, paper section 4.1
 MIN_DIAGONALS, MAX_DIAGONALS = 1.5, 4.5  # from the box's middle to the eye

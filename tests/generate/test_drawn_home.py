@@ -9,10 +9,15 @@ import pytest
 
 from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.made_home import MadeHome
-from pbrs_farm.generate.drawn_home import DrawnHome, drawn_home, with_other_uses, with_rooms_of
 from pbrs_farm.generate.floor_plan import OpeningKind, Plan, PlanOpening, PlanRoom, RoomType
-from pbrs_farm.generate.furnish.gates import furnish_report
-from pbrs_farm.generate.generated_home import generate_home
+from pbrs_farm.generate.generated_home import (
+    DrawnHome,
+    drawn_home,
+    furnish_report,
+    generate_home,
+    with_other_uses,
+    with_rooms_of,
+)
 from pbrs_farm.generate.plan_families import plan_families
 from pbrs_farm.generate.programme import Wishes
 from tests.generate.furnish.shelves import plain_catalogue

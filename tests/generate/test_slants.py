@@ -10,11 +10,10 @@ import pytest
 from shapely.geometry import Point, Polygon
 
 from pbrs_farm.core.made_home import PLANS
-from pbrs_farm.generate.drawn_plan import drawn_plan
+from pbrs_farm.generate.drawn_plan import drawn_plan, with_slants
 from pbrs_farm.generate.floor_plan import OpeningKind, Plan, PlanWall
 from pbrs_farm.generate.openings import plan_faults
 from pbrs_farm.generate.plan_families import plan_families
-from pbrs_farm.generate.slants import with_slants
 
 _PLAIN = plan_families()["flat"].model_copy(update={"slanted": 0.0, "bay": 0.0})
 

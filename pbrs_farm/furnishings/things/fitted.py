@@ -1,6 +1,6 @@
 """Furniture that fills a wall up to the ceiling: wardrobes, bookcases, show cases; no effects.
 
-Furnishing stretches them to the wall they are for (generate/furnish/fitted_walls.py), and so does dressing.
+Furnishing stretches them to the wall they are for (generate/furnish/small_rooms.py), and so does dressing.
 """
 
 from __future__ import annotations

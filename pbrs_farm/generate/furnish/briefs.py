@@ -13,7 +13,7 @@ from pydantic import Field, field_validator
 
 from pbrs_farm.core.record import Record, read_toml
 from pbrs_farm.generate.floor_plan import Plan, RoomType
-from pbrs_farm.generate.furnish import bathrooms, bedrooms, fitted_walls, living_rooms, small_rooms
+from pbrs_farm.generate.furnish import bedrooms, living_rooms, small_rooms
 from pbrs_farm.generate.furnish.kitchen import kitchen_places, units_of
 from pbrs_farm.generate.furnish.pieces import Shelf
 from pbrs_farm.generate.furnish.places import Places, fixed_places
@@ -49,7 +49,7 @@ _Measure = Literal["bounds", "area", "row", "stretches", "seats"]
 # Template functions available to briefs.toml: every public function of the template modules.
 _TEMPLATES_BY_NAME: Final[dict[str, Callable[..., tuple[Template, ...]]]] = {
     name: function
-    for module in (bathrooms, bedrooms, fitted_walls, living_rooms, small_rooms)
+    for module in (bedrooms, living_rooms, small_rooms)
     for name, function in vars(module).items()
     if getattr(function, "__module__", "") == module.__name__ and not name.startswith("_")
 }

@@ -22,7 +22,7 @@ from pbrs_farm.core.house import (
 )
 from pbrs_farm.core.mesh import area_vectors, distances_to_triangles, unit_vectors
 from pbrs_farm.core.recipe import RepairFields
-from pbrs_farm.geometry.icosphere import icosphere_mesh
+from pbrs_farm.geometry.solids import icosphere_mesh
 from pbrs_farm.repair.repair_report import SourceRepair
 
 _CLEARANCE = 0.97  # share of the free distance that a bulb's radius takes

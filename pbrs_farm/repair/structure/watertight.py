@@ -1,22 +1,28 @@
-"""Walls, floors and ceilings united to one solid that light cannot pass, with openings cut; no effects."""
+"""Walls, floors and ceilings united to one solid that light cannot pass, with openings cut; no effects.
+
+The area of each is measured before and after. A wall is measured from the side, along its thickness, with its openings
+already cut out: the difference is the area that repair cut away. Floors and ceilings are measured from above.
+"""
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
+import numpy as np
+import shapely
 from manifold3d import Manifold
 
-from pbrs_farm.core.house import House, Item, Surface
-from pbrs_farm.repair.measure.enclosure import Space, spaces_of_rooms
+from pbrs_farm.core.house import House, Item, ItemKind, Opening, Room, Surface
+from pbrs_farm.repair.measure.enclosure import Space, bare_area, spaces_of_rooms
 from pbrs_farm.repair.measure.room_interiors import RoomInterior, interiors_of_room
-from pbrs_farm.repair.repair_report import LeftAsIs, Removed, StructureReport
+from pbrs_farm.repair.repair_report import LeftAsIs, Removed, SideArea, StructureReport, WallLoss
 from pbrs_farm.repair.structure import plan_geometry as plan
 from pbrs_farm.repair.structure.booleans import TagTable, patches_from_solid, unite
 from pbrs_farm.repair.structure.closed_shells import surface_from_patch
 from pbrs_farm.repair.structure.cut_openings import WallPart, cut_openings, thresholds
 from pbrs_farm.repair.structure.joints import joints_between_walls, joints_with_surface
-from pbrs_farm.repair.structure.own_sides import with_own_sides_visible
+from pbrs_farm.repair.structure.own_sides import along_and_across, with_own_sides_visible
 from pbrs_farm.repair.structure.planar_surfaces import (
     Cover,
     FloorsAndCeilings,
@@ -24,15 +30,15 @@ from pbrs_farm.repair.structure.planar_surfaces import (
     covers_of_roof_windows,
     floors_and_ceilings_from_house,
 )
+from pbrs_farm.repair.structure.prisms import polygons_of
 from pbrs_farm.repair.structure.room_volumes import RoomVolume, volumes_of_rooms, without_volumes
 from pbrs_farm.repair.structure.slabs import (
+    GAP_M,
     bridge_gaps,
     footprints_of_surfaces,
     slab,
     visible_areas,
 )
-from pbrs_farm.repair.structure.stairwells import stairwells_of_house
-from pbrs_farm.repair.structure.wall_loss import lost_walls, side_areas
 from pbrs_farm.repair.structure.walls import Wall, walls_from_house, with_metric_uv
 
 
@@ -184,3 +190,163 @@ def with_structure(house: House, structure: Structure) -> tuple[House, list[Remo
         else:
             items.append(replace(item, surfaces=surfaces))
     return house.with_items(items), removed
+
+
+_MIN_AREA_M2 = 0.05  # a smaller hole is a gap in the drawing
+_NEIGHBOUR_M = 0.6  # a floor farther away is not carried on
+
+
+@dataclass(frozen=True, slots=True, eq=False)
+class Stairwells:
+    """Stairwells as rooms, with their added floors and ceilings."""
+
+    wells: tuple[Room, ...]  # ids "well_<level>_<k>"
+    surfaces: tuple[PlanarSurface, ...]
+
+
+def stairwells_of_house(
+    house: House, walls: Sequence[Wall], surfaces: Sequence[PlanarSurface], covers: Sequence[Cover]
+) -> Stairwells:
+    """Holes with stairs among a level's rooms and walls, their covers continued from the nearest."""
+    wells = [
+        Room(
+            id=f"well_{level_id}_{k}",
+            name="stairwell",
+            level_id=level_id,
+            polygon=shapely.get_coordinates(hole.exterior)[:-1],
+            floor_y=floor_y,
+            ceiling_y=ceiling_y,
+        )
+        for level_id in dict.fromkeys(r.level_id for r in house.rooms)
+        for k, (hole, floor_y, ceiling_y) in enumerate(_holes(house, level_id, walls))
+    ]
+    rooms = (*house.rooms, *wells)
+    added = []
+    for well in wells:
+        for above in (False, True):
+            # Extend the nearest floor or ceiling where the stairwell has none.
+            bare = bare_area(well, rooms, covers, above=above)
+            if bare.area > _MIN_AREA_M2:
+                added += _continued(bare, well, surfaces, is_ceiling=above)
+    return Stairwells(tuple(wells), tuple(added))
+
+
+def _holes(
+    house: House, level_id: str, walls: Sequence[Wall]
+) -> Iterator[tuple[shapely.Polygon, float, float]]:
+    rooms = [r for r in house.rooms if r.level_id == level_id]
+    floor_y = min(r.floor_y for r in rooms)
+    ceiling_y = max(r.ceiling_y for r in rooms)
+    # Merge the rooms and walls of this level.
+    feet = [w.footprint for w in walls if w.bottom_y < ceiling_y - 0.1 and w.high_y > floor_y + 0.1]
+    # A stairwell stored as a room of two storeys is not a hole of this level.
+    middle_y = (floor_y + ceiling_y) / 2
+    through = [r for r in house.rooms if r.floor_y < middle_y < r.ceiling_y]
+    areas = [plan.polygon_of_room(r.polygon) for r in {r.id: r for r in rooms + through}.values()]
+    whole = plan.closed(plan.union([*areas, *feet]), 2 * GAP_M)
+    stairs = [
+        # Boxes of stairs that begin or end here.
+        shapely.box(low[0], low[2], high[0], high[2])
+        for low, high in (i.bounds for i in house.items if i.kind is ItemKind.STAIRS)
+        if low[1] < ceiling_y and high[1] > floor_y - 0.2
+    ]
+    # Keep the holes with stairs in them.
+    for polygon in polygons_of(whole):
+        for ring in polygon.interiors:
+            hole = shapely.Polygon(ring)
+            if hole.area > _MIN_AREA_M2 and any(s.intersects(hole) for s in stairs):
+                yield shapely.orient_polygons(hole), floor_y, ceiling_y
+
+
+def _continued(
+    area: plan.Shape, well: Room, surfaces: Sequence[PlanarSurface], *, is_ceiling: bool
+) -> list[PlanarSurface]:
+    low, high = well.floor_y - GAP_M, well.ceiling_y + GAP_M
+    near = [
+        s
+        for s in surfaces
+        if s.is_ceiling == is_ceiling
+        and s.area.distance(area) < _NEIGHBOUR_M
+        and low < s.plane.at(shapely.get_coordinates(s.area)).mean() < high
+    ]
+    if not near:
+        return []
+    nearest = min(near, key=lambda s: s.area.distance(area))
+    return [replace(nearest, area=p) for p in polygons_of(area)]
+
+
+MAX_LOST_SHARE = 0.1
+"""A wall that loses more of its side is a fault of the repair."""
+
+_LEAST_M2 = 0.01  # less is lost to rounding
+
+
+def side_areas(
+    house: House,
+    walls: Sequence[Wall],
+    cut: Sequence[Wall],
+    left: Sequence[Manifold],
+    surfaces: Mapping[int, Sequence[Surface]],
+    table: TagTable,
+) -> tuple[SideArea, ...]:
+    """Square metres of every structure item before and after.
+
+    walls: before any cut. cut: trimmed by other rooms; left: with their openings cut too, in the same
+    order. surfaces: item index -> new surfaces; other items are unchanged.
+    """
+    before, after = [0.0] * len(house.items), [0.0] * len(house.items)
+    for wall, cut_wall, rest in zip(walls, cut, left, strict=True):
+        area = _seen_from_the_side(rest, wall.footprint)
+        after[wall.item] += area
+        # Cut the openings out of the wall as it was; where nothing else was cut, that is the rest.
+        if cut_wall.solid is not wall.solid:
+            area = _seen_from_the_side(
+                _cut_openings_of_wall(house.openings, wall, table), wall.footprint
+            )
+        before[wall.item] += area
+    uprights = {w.item for w in walls}
+    rows = []
+    for index, item in enumerate(house.items):
+        if not item.kind.is_structure:
+            continue
+        if index not in uprights:
+            before[index] = _seen_from_above(item.surfaces)
+            after[index] = _seen_from_above(surfaces.get(index, item.surfaces))
+        rows.append(_side_area_of(item, before[index], after[index]))
+    return tuple(rows)
+
+
+def lost_walls(areas: Iterable[SideArea]) -> tuple[WallLoss, ...]:
+    """The walls whose side lost more than MAX_LOST_SHARE and _LEAST_M2."""
+    return tuple(
+        WallLoss(item_id=a.item_id, before_m2=a.before_m2, after_m2=a.after_m2)
+        for a in areas
+        if a.kind == ItemKind.WALL
+        and a.before_m2 - a.after_m2 > max(MAX_LOST_SHARE * a.before_m2, _LEAST_M2)
+    )
+
+
+def _cut_openings_of_wall(openings: Sequence[Opening], wall: Wall, table: TagTable) -> Manifold:
+    # Where the source has cut the walls already, nothing is cut: their solids have the holes.
+    return cut_openings(openings, [WallPart(wall, wall.solid, is_joint=False)], table)[0][0]
+
+
+def _seen_from_the_side(solid: Manifold, footprint: plan.Shape) -> float:
+    if solid.is_empty() or footprint.is_empty:
+        return 0.0
+    # Turn the wall so that its thickness is along z, and project along z.
+    along, across = along_and_across(footprint)
+    turned = np.zeros((3, 4))
+    turned[0, [0, 2]], turned[1, 1], turned[2, [0, 2]] = along, 1.0, across
+    return float(solid.transform(turned).project().area())
+
+
+def _seen_from_above(surfaces: Iterable[Surface]) -> float:
+    shapes = [plan.polygon_of_triangles(s.positions.astype(float), s.faces) for s in surfaces]
+    return float(shapely.area(plan.union(shapes)))
+
+
+def _side_area_of(item: Item, before: float, after: float) -> SideArea:
+    return SideArea(
+        item_id=item.id, kind=str(item.kind), before_m2=round(before, 3), after_m2=round(after, 3)
+    )

@@ -17,11 +17,11 @@ from pbrs_farm.generate.floor_plan import (
     PlanWall,
     RoomType,
 )
-from pbrs_farm.generate.furnish.fitted_walls import fitted_wardrobes
 from pbrs_farm.generate.furnish.living_rooms import dining
 from pbrs_farm.generate.furnish.pieces import Shelf
 from pbrs_farm.generate.furnish.places import places_of
 from pbrs_farm.generate.furnish.room_space import FurnishSpace, free_stretches, room_space
+from pbrs_farm.generate.furnish.small_rooms import fitted_wardrobes
 from pbrs_farm.generate.furnish.template import PieceGroup
 
 W, D = 4.0, 3.0

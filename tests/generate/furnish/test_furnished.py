@@ -10,10 +10,9 @@ from shapely.geometry import Point, Polygon
 
 from pbrs_farm.core.catalogue import EMPTY
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.generate.drawn_home import drawn_home
 from pbrs_farm.generate.floor_plan import PlacedPiece, Plan
 from pbrs_farm.generate.furnish.furnished import furnished
-from pbrs_farm.generate.furnish.gates import furnish_report
+from pbrs_farm.generate.generated_home import drawn_home, furnish_report
 from tests.generate.furnish.shelves import plain_catalogue
 
 SEEDS = (1, 2, 3, 7)

@@ -8,8 +8,7 @@ import pytest
 from pbrs_farm.core.catalogue import Catalogue, Piece, Place, Shape
 from pbrs_farm.core.house import Material
 from pbrs_farm.generate.furnish.living_rooms import dining
-from pbrs_farm.generate.furnish.pieces import Shelf
-from pbrs_farm.generate.furnish.under_tables import way_under_m
+from pbrs_farm.generate.furnish.pieces import Shelf, way_under_m
 from pbrs_farm.geometry.solids import box
 
 SEAT_M, BACK_M = 0.45, 0.04
