@@ -11,7 +11,7 @@ from typing import Final
 
 import numpy as np
 
-from pbrs_farm.core.arrays import F64, I32, Bools
+from pbrs_farm.core.arrays import F64, I32, I64, Bools
 from pbrs_farm.core.house import Surface
 from pbrs_farm.core.mesh import area_vectors, cross_products, lengths, unit_vectors
 from pbrs_farm.geometry import solids
@@ -210,6 +210,11 @@ def loft(rings: Sequence[tuple[Outline, float]], *, sharp: float = 50.0) -> Surf
     k, n = places.shape[:2]
     middles = np.stack([places[0].mean(0), places[-1].mean(0)])
     points = np.concatenate([places.reshape(-1, 3), middles])
+    return creased("loft", points, _faces_of_rings(k, n), np.radians(sharp))
+
+
+def _faces_of_rings(k: int, n: int) -> I64:
+    """Faces around k rings of n points, one after another, closed by the middles of the first and the last."""
     i = np.arange(n)
     j = (i + 1) % n
     faces = []
@@ -219,7 +224,7 @@ def loft(rings: Sequence[tuple[Outline, float]], *, sharp: float = 50.0) -> Surf
     top = (k - 1) * n
     faces += [np.stack([np.full(n, k * n), j, i], -1)]
     faces += [np.stack([np.full(n, k * n + 1), top + i, top + j], -1)]
-    return creased("loft", points, np.concatenate(faces), np.radians(sharp))
+    return np.concatenate(faces)
 
 
 def board(
@@ -286,16 +291,7 @@ def tube(path: Sequence[Triple], r: float, *, n: int = 8, end: float | None = No
         ring = ring + (stretch - 1) * (ring @ across)[:, None] * across
         rings.append(points[k] + ring)
     places = np.concatenate([*rings, points[:1], points[-1:]])
-    k, i = len(rings), np.arange(n)
-    j = (i + 1) % n
-    faces = []
-    for row in range(k - 1):
-        a, b = row * n, (row + 1) * n
-        faces += [np.stack([a + i, b + j, a + j], -1), np.stack([a + i, b + i, b + j], -1)]
-    top = (k - 1) * n
-    faces += [np.stack([np.full(n, k * n), i, j], -1)]
-    faces += [np.stack([np.full(n, k * n + 1), top + j, top + i], -1)]
-    return creased("tube", places, np.concatenate(faces), _SHARP_RAD)
+    return creased("tube", places, _faces_of_rings(len(rings), n)[:, [0, 2, 1]], _SHARP_RAD)
 
 
 def hoop(outline: Outline, y: float, r: float, *, n: int = 6) -> Surface:
