@@ -11,6 +11,8 @@ from importlib.metadata import PackageNotFoundError, version
 from pathlib import Path
 from typing import Any
 
+from pbrs_farm.operating_system import processor_name
+
 FOLDER = Path("out/bench")
 PACKAGES = (
     "numpy", "scipy", "mitsuba", "drjit", "moderngl", "pyoidn", "OpenImageIO", "pyarrow",
@@ -45,20 +47,12 @@ def write_report(name: str, figures: Mapping[str, Any], units: Mapping[str, str]
 def machine() -> dict[str, Any]:
     """Processor, cores, memory, system, and how busy the machine is with other work."""
     return {
-        "cpu": _cpu(),
+        "cpu": processor_name(),
         "cores": len(os.sched_getaffinity(0)),
         "memory_gb": round(os.sysconf("SC_PAGE_SIZE") * os.sysconf("SC_PHYS_PAGES") / 1e9, 1),
         "system": platform.platform(),
         "load_1min": round(os.getloadavg()[0], 2),
     }
-
-
-def _cpu() -> str:
-    try:
-        lines = Path("/proc/cpuinfo").read_text().splitlines()
-    except OSError:
-        return platform.processor()
-    return next((x.partition(":")[2].strip() for x in lines if x.startswith("model name")), "")
 
 
 def versions() -> dict[str, str]:

@@ -104,6 +104,7 @@ def _run_parsed(words: Sequence[str], verb: str, module: str | None) -> int:
     if unknown:
         of_verb = parser.verbs().get(verb, parser)
         of_verb.error(unknown_words(unknown, of_verb))
+    args.words = words
     if not hasattr(args, "handler"):
         parser.print_help()
         return 2

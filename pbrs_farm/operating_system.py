@@ -10,6 +10,7 @@ import contextlib
 import ctypes
 import errno
 import os
+import platform
 import select
 import signal
 import stat
@@ -364,6 +365,16 @@ def path_of_url(path: str) -> Path:
 def kernel_cache() -> Path:
     """Dr.Jit's folder of compiled kernels."""
     return Path.home() / ".drjit" if _POSIX else Path.home() / "AppData/Local/Temp/drjit"
+
+
+def processor_name() -> str:
+    """Model of the processor, or its kind where the system has no /proc."""
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+    except OSError:
+        lines = []
+    names = (x.partition(":")[2].strip() for x in lines if x.startswith("model name"))
+    return next(names, platform.processor() or platform.machine())
 
 
 def has_nvidia_driver() -> bool:

@@ -50,10 +50,8 @@ TASKS: Final[dict[str, tuple[int, int, tuple[str, ...]]]] = {
 }  # fmt: skip
 """Task -> training views, seeds, and changes to plan `lite`."""
 _BEST: Final = {"normals": ("mean_deg", min), "segmentation": ("mean_iou", max), "boundaries": ("ods", max)}  # fmt: skip
-MADE_BY: Final = (
-    "python -m benchmarks.study.shipped render",
-    "python -m benchmarks.study.shipped train",
-)
+MADE_BY: Final = ("python -m benchmarks.study.shipped render",)
+"""Commands before the training, which records its own."""
 
 
 def main(words: Sequence[str]) -> None:

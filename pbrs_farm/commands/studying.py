@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import json
+import shlex
 from dataclasses import replace
 from importlib.util import find_spec
 from pathlib import Path
@@ -67,7 +68,7 @@ def _train(args: argparse.Namespace) -> None:
     from pbrs_farm.study.networks.initial_weights import credits_of_init
     from pbrs_farm.study.training.loggers import check_installed, loggers
     from pbrs_farm.study.training.photograph_views import digests_of, facts_of, mix_of
-    from pbrs_farm.study.training.prediction import device_of
+    from pbrs_farm.study.training.prediction import check_onnx, device_of
     from pbrs_farm.study.training.training_job import Job, train
     from pbrs_farm.study.training.training_views import ViewArrays
     from pbrs_farm.study.training.view_sources import (
@@ -85,6 +86,8 @@ def _train(args: argparse.Namespace) -> None:
     # Report missing packages before reading views.
     device_of(plan)
     check_installed(args.log)
+    if args.export == "onnx":
+        check_onnx()
     views, held_out = training_views(source, plan), held_out_views(source, plan)
     n_held = len(held_out) if held_out else 0
     lacking = left_out(source, plan)
@@ -118,7 +121,11 @@ def _train(args: argparse.Namespace) -> None:
         source.name,
         init,
         stop_on=stop_on,
-        facts={"credits": list(dict.fromkeys(credits)), **facts_of(photographs, plan)},
+        facts={
+            "credits": list(dict.fromkeys(credits)),
+            "command": _command(args),
+            **facts_of(photographs, plan),
+        },
     )
     # Print about twenty of the logged steps.
     period = max(plan.steps // 20 // plan.log_every, 1) * plan.log_every
@@ -136,6 +143,10 @@ def _train(args: argparse.Namespace) -> None:
         _print_run(args.out)
         if args.export:
             _EXPORTS[args.export](args.out)
+
+
+def _command(args: argparse.Namespace) -> str:
+    return shlex.join(["pbrs-farm", *args.words])
 
 
 def _stop_on(name: str, places: list[str], plan: TrainingPlan) -> str:
@@ -211,15 +222,14 @@ def _evaluate(args: argparse.Namespace) -> None:
     evaluations = [evaluate(run, place, mirror=mirror) for place in places]
     for predictions in columns:
         evaluations = _with_column(run, evaluations, predictions)
-    rows = report(run, evaluations)
     if args.json:
-        echo_json(rows)
+        echo_json(report(run, evaluations, _command(args)))
     else:
         echo(evaluation_text(run, evaluations))
     if evaluations:
         from pbrs_farm.study.judging.error_page import write_evaluation
 
-        page = write_evaluation(out, run, evaluations)
+        page = write_evaluation(out, run, evaluations, _command(args))
         if not args.json:
             echo(str(page))
 

@@ -29,9 +29,11 @@ from pbrs_farm.views.png_rows import png_of_rows
 N_SHOWN: Final = 8  # number of worst views on the page, and of best ones
 
 
-def write_evaluation(out: Path, run: Trained, evaluations: list[Evaluation]) -> Path:
+def write_evaluation(
+    out: Path, run: Trained, evaluations: list[Evaluation], command: str = ""
+) -> Path:
     """Write table.md, evaluation.json and index.html; the page's path. BadInput if not writable."""
-    rows, html = report(run, evaluations), error_page(run, evaluations)
+    rows, html = report(run, evaluations, command), error_page(run, evaluations)
     page = write_report(out, "evaluation.json", rows, html)
     (out / "table.md").write_text(evaluation_text(run, evaluations) + "\n", "utf-8")
     return page

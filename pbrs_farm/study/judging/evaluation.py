@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 from torch import nn
 
+import pbrs_farm
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_nearest
@@ -362,6 +363,8 @@ def notes(run: Trained, evaluations: list[Evaluation]) -> list[str]:
             f"underfit: the error on its own training views, {train:.3g}, is above 80 % of the"
             f" baseline's, {constant:.3g}; rank nothing by it"
         )
+    if took := run.record.get("seconds"):
+        lines.append(f"trained in {took / 60:.0f} minutes on {run.record['machine']}")
     if seconds := run.record.get("seconds_a_step"):
         fastest = min(seconds, key=lambda name: float(seconds[name]))
         timed = ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())
@@ -409,11 +412,11 @@ def evaluation_text(run: Trained, evaluations: list[Evaluation]) -> str:
     return "\n".join([*tables, *notes(run, evaluations)])
 
 
-def report(run: Trained, evaluations: list[Evaluation]) -> dict[str, Any]:
+def report(run: Trained, evaluations: list[Evaluation], command: str = "") -> dict[str, Any]:
     """Content of evaluation.json; None for figures without pixels.
 
     run, trained (figures at the end of training), evaluations (figures, parts of normals, groups and
-    the error of each view), the paper's row and the notes.
+    the error of each view), the paper's row, the notes, and the command with its version.
     """
     paper = _paper(run)
     row = {
@@ -422,6 +425,8 @@ def report(run: Trained, evaluations: list[Evaluation]) -> dict[str, Any]:
         "evaluations": [evaluation.as_json() for evaluation in evaluations],
         "paper": paper.model_dump(exclude={"task"}, mode="json") if paper else None,
         "notes": notes(run, evaluations),
+        "command": command,
+        "pbrs_farm": pbrs_farm.__version__,
     }
     return {key: _without_nan(value) for key, value in row.items()}
 

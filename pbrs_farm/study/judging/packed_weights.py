@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import hashlib
 import json
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from importlib.resources import files
@@ -18,7 +19,7 @@ import numpy as np
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.installation import checkout_folder, need
-from pbrs_farm.study.judging.evaluation import Trained, open_run, trained_columns
+from pbrs_farm.study.judging.evaluation import Trained, open_run, parts_tables, trained_columns
 from pbrs_farm.study.judging.figure_text import markdown, shown_figure, title_of
 from pbrs_farm.study.training.checkpoint import read_tensors, write_tensor_file
 from pbrs_farm.study.training.run_folder import RunFolder, make_folder
@@ -33,6 +34,9 @@ _PREDICTS: Final = {
     "boundaries": "the probability of an object boundary at each pixel",
 }
 _MOST_HOMES: Final = 12  # number of homes named on the card
+_LOCAL: Final = re.compile(
+    r"(?<![^\s='\"])/(?:[^/\s'\"]+/)*"
+)  # folders of this machine, in commands
 
 
 def weights_folder() -> Path:
@@ -55,7 +59,10 @@ def shipped_run(task: str) -> Path:
 
 
 def pack_weights(root: Path, out: Path, *, made_by: Sequence[str] = ()) -> RunFolder:
-    """Write a finished run as half floats, record and card (with results and made_by); BadInput for others."""
+    """Write a finished run as half floats, record and card with results and commands; BadInput for others.
+
+    made_by: commands before the training.
+    """
     run, packed = open_run(root), RunFolder(make_folder(out))
     tensors, position = read_tensors(run.folder.weights)
     halves = {name: x.half() if x.is_floating_point() else x for name, x in tensors.items()}
@@ -68,9 +75,11 @@ def pack_weights(root: Path, out: Path, *, made_by: Sequence[str] = ()) -> RunFo
     origin = {k: v for k, v in run.record["init_origin"].items() if k != "file"}
     record = run.record | {"source": " + ".join(names), "weights_sha256": digest}
     record |= {"init": PurePosixPath(record["init"]).name, "init_origin": origin}
-    record |= {"made_by": list(made_by)} if made_by else {}
+    report = _report(root)
+    commands = [*made_by, record.pop("command", ""), report.get("command", "")]
+    record["made_by"] = [_LOCAL.sub("", command) for command in commands if command]
     packed.write("run.json", record | {"plan": plan_as_json(run.plan), "step": position.step})
-    evaluations = _evaluations(root)
+    evaluations = report.get("evaluations", [])
     # Omit the errors of single views.
     packed.write("judged.json", [row | {"errors": {}} for row in evaluations])
     card = model_card(run, record | {"step": position.step}, evaluations)
@@ -78,9 +87,11 @@ def pack_weights(root: Path, out: Path, *, made_by: Sequence[str] = ()) -> RunFo
     return packed
 
 
-def _evaluations(root: Path) -> list[dict[str, Any]]:
+def _report(root: Path) -> dict[str, Any]:
+    """Content of the run's evaluation.json; {} if it was not evaluated."""
     path = root / "evaluation" / "evaluation.json"
-    return list(json.loads(path.read_bytes())["evaluations"]) if path.exists() else []
+    report: dict[str, Any] = json.loads(path.read_bytes()) if path.exists() else {}
+    return report
 
 
 def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[str, Any]]) -> str:
@@ -91,6 +102,7 @@ def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[s
     stop = record.get("stop_on", "")
     chosen = f"step {record['step']:,} of {plan.steps:,}"
     machine = f"; {record['machine']}" if "machine" in record else ""
+    machine += f", {record['seconds'] / 60:.0f} minutes" if "seconds" in record else ""
     commands = "\n".join(record.get("made_by", ()))
     chosen += f", chosen by the error on {stop.removeprefix('on_')}" if stop else ""
     parts = [
@@ -108,6 +120,7 @@ def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[s
         f"Truth: {record['truth']}.",
         "## Figures",
         _figures(run, evaluations),
+        *filter(None, [parts_tables(evaluations)]),
         *(f"Truth of {row['on']}: {row['truth']}." for row in evaluations),
         "## Limits",
         f"A small network at {size}, trained on few pictures: not for measuring or for safety."

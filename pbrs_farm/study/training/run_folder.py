@@ -94,9 +94,9 @@ class RunFolder:
         self.write("run.json", {**row, "state": RUNNING})
         return True
 
-    def end(self, state: str, why: str = "") -> None:
-        """Write the final state, and the reason of a failure."""
-        self.write("run.json", {**self.record(), "state": state, "why": why})
+    def end(self, state: str, why: str = "", **facts: Any) -> None:
+        """Write the final state, the reason of a failure and facts known only at the end."""
+        self.write("run.json", {**self.record(), **facts, "state": state, "why": why})
 
     def write(self, name: str, value: Any) -> None:
         """Write a file of JSON, complete or not at all."""

@@ -13,6 +13,7 @@ import torch
 
 import pbrs_farm
 from pbrs_farm.core.errors import PbrsError
+from pbrs_farm.operating_system import processor_name
 from pbrs_farm.study.networks.initial_weights import start_from
 from pbrs_farm.study.networks.network_choice import n_weights, network_of
 from pbrs_farm.study.tasks.tasks import task_of
@@ -94,7 +95,7 @@ def train(
     folder.write_text("curves.svg", _curves(folder, plan))
     for path in (folder.checkpoint, folder.best):
         path.unlink(missing_ok=True)
-    folder.end(FINISHED)
+    folder.end(FINISHED, seconds=_seconds(folder, plan))
     return figures
 
 
@@ -146,10 +147,20 @@ def _record(
     }
 
 
+def _seconds(folder: RunFolder, plan: TrainingPlan) -> float:
+    """Seconds of all steps by the logged rates, so that those before a kill count."""
+    seconds, last = 0.0, 0.0
+    for row in folder.metrics():
+        if "views_s" in row:
+            seconds += (row["step"] - last) * plan.batch / max(row["views_s"], 1e-9)
+            last = row["step"]
+    return round(seconds, 1)
+
+
 def _machine(plan: TrainingPlan) -> str:
-    """Name of the GPU, or kind of the processor, and the number of cores."""
+    """Name of the GPU or of the processor, and the number of cores."""
     device = device_of(plan)
-    name = torch.cuda.get_device_name(device) if device.type == "cuda" else platform.machine()
+    name = torch.cuda.get_device_name(device) if device.type == "cuda" else processor_name()
     return f"{name}, {os.cpu_count()} cores"
 
 

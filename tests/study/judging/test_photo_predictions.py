@@ -156,10 +156,45 @@ def test_onnx_predicts_like_the_run(run: Path, tmp_path: Path) -> None:
     np.testing.assert_allclose(output, expected, atol=1e-4)
 
 
+def test_a_card_has_the_errors_by_kind_of_surface_and_the_command_of_the_evaluation(
+    run: Path, tmp_path: Path
+) -> None:
+    from pbrs_farm.study.judging.packed_weights import pack_weights
+
+    (tmp_path / "desk").mkdir()
+    rgb = np.random.default_rng(0).integers(0, 256, (60, 90, 3)).astype(np.uint8)
+    (tmp_path / "desk/1_rgb.png").write_bytes(png_from_array(rgb))
+    depth = np.full((60, 90), 2000, np.uint16)
+    (tmp_path / "desk/1_depth.png").write_bytes(png_from_array(depth))
+    (tmp_path / "desk/intrinsics.json").write_text('{"fx": 80, "fy": 80, "cx": 45, "cy": 30}')
+    copy = tmp_path / "copy"
+    shutil.copytree(run, copy)
+    assert main(["evaluate", str(copy), "--on", f"wall={tmp_path}", "--no-mirror"]) == 0
+    card = (pack_weights(copy, tmp_path / "packed").root / "README.md").read_text()
+    assert f"pbrs-farm evaluate copy --on wall={tmp_path.name} --no-mirror\n```" in card
+    assert "| frontal " in card
+    assert str(tmp_path) not in card
+    report = json.loads((copy / "evaluation/evaluation.json").read_text())
+    assert not report["evaluations"][0]["mirror"]
+    assert report["run"]["seconds"] > 0
+
+
+def test_onnx_is_asked_for_before_the_training(
+    run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+) -> None:
+    monkeypatch.setattr("pbrs_farm.study.training.prediction.find_spec", lambda _name: None)
+    words = ["train", "normals", str(run.parent / "nothing"), "--out", str(tmp_path / "run")]
+    assert main([*words, "--export", "onnx"]) == 1
+    assert "ONNX needs onnx" in capsys.readouterr().err
+    assert not (tmp_path / "run").exists()
+
+
 def test_packed_weights_predict_like_the_run_and_are_checked_by_their_sha256(
     run: Path, tmp_path: Path
 ) -> None:
-    from pbrs_farm.study.judging.evaluation import open_run
+    import torch
+
+    import pbrs_farm
     from pbrs_farm.study.judging.packed_weights import pack_weights
     from pbrs_farm.study.training.prediction import predict
 
@@ -173,7 +208,10 @@ def test_packed_weights_predict_like_the_run_and_are_checked_by_their_sha256(
     card = (packed.root / "README.md").read_text()
     assert half.record["weights_sha256"] in card
     assert "degrees" in card
-    assert f"{os.cpu_count()} cores.\n\nMade by:\n\n```\npbrs-farm run home\n```\n" in card
+    made_by = f"{os.cpu_count()} cores, 0 minutes.\n\nMade by:\n\n```\npbrs-farm run home\n"
+    assert f"{made_by}pbrs-farm train normals root --out run --hold-out none --set" in card
+    assert f"pbrs_farm {pbrs_farm.__version__}, torch {torch.__version__}" in card
+    assert str(run.parent) not in card + (packed.root / "run.json").read_text()
 
     data = bytearray(packed.weights.read_bytes())
     data[-1] ^= 1
