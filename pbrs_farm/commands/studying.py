@@ -235,12 +235,10 @@ def _evaluate(args: argparse.Namespace) -> None:
 
 
 def _is_mirrored(args: argparse.Namespace, run: Trained) -> bool:
-    """--mirror or --no-mirror; by default True if the second pass is cheap."""
     from pbrs_farm.study.training.prediction import is_mirror_cheap
 
-    if args.mirror is None:
-        return is_mirror_cheap(run.network, run.task, run.plan)
-    return bool(args.mirror)
+    is_chosen: bool | None = args.mirror
+    return is_mirror_cheap(run.network, run.task, run.plan) if is_chosen is None else is_chosen
 
 
 def _check_judged(args: argparse.Namespace) -> None:

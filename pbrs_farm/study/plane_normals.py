@@ -11,12 +11,18 @@ from typing import Any, Final
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.ndimage import uniform_filter
 
 from pbrs_farm.core.arrays import F32, F64, Mask
 
+_Pixels = tuple[NDArray[np.intp], ...]  # rows and columns
 _N_TRIPLES, _N_POINTS = 600, 3000  # candidate planes, and pixels that score them
 _REACH: Final = 0.2  # of a triple, share of the width
 _MOST_PLANES: Final = 12
+_LEAST_SHARE: Final = 0.03  # of the picture, of a large plane
+# Kinect's noise grows with the square of depth, so distances are relative to depth.
+_MOST_DISTANCE: Final = 0.015  # of a pixel from its plane
+_LEAST_COSINE: Final = 0.87  # between local normal and plane: 30 degrees
 
 _STEPS: Final = (
     -1.0,
@@ -40,15 +46,6 @@ class PlaneFit:
     least_share: float = 0.6  # minimum share of samples on the surface
     most_residual: float = 0.01  # maximum RMS distance from the plane, relative to depth
     least_cosine: float = 0.15  # minimum cosine between normal and ray
-
-
-@dataclass(frozen=True, slots=True)
-class LargePlanes:
-    """Limits of large planes. Kinect's noise grows with the square of depth, so distances are relative to it."""
-
-    least_share: float = 0.03  # minimum share of the picture
-    most_distance: float = 0.015  # maximum distance of a pixel, relative to depth
-    least_cosine: float = 0.87  # minimum cosine between local normal and plane: 30 degrees
 
 
 def normals_of_depth(
@@ -122,20 +119,13 @@ def _residual(sums: F64, a: F64, b: F64, c: F64) -> F64:
     return np.asarray(ww - a * uw - b * vw - c * w)
 
 
-def large_planes(
-    depth_m: NDArray[Any],
-    normal: NDArray[Any],
-    valid: Mask,
-    K: F64,
-    limits: LargePlanes | None = None,
-) -> F32:
+def large_planes(depth_m: NDArray[Any], normal: NDArray[Any], valid: Mask, K: F64) -> F32:
     """(H, W, 3) normals of the large planes through the valid pixels, 0 elsewhere.
 
     RANSAC with a fixed seed, the largest plane first, each refined by least squares of inverse
     depth. normal (H, W, 3): unit vectors of normals_of_depth, which keep a plane off the clutter
     that it crosses.
     """
-    limits = limits or LargePlanes()
     height, width = valid.shape
     x = (np.arange(width) + 0.5 - K[0, 2]) / K[0, 0]
     y = (np.arange(height) + 0.5 - K[1, 2]) / K[1, 1]
@@ -144,16 +134,16 @@ def large_planes(
     dice, is_free = np.random.default_rng(0), valid.copy()
     planes = np.zeros((height, width, 3), np.float32)
 
-    def near(plane: F64, at: tuple[NDArray[np.intp], ...]) -> Mask:
+    def near(plane: F64, at: _Pixels) -> Mask:
         """The pixels on planes (3, ...) a x + b y + c = 1/z, (pixels, ...)."""
         unit = plane / np.linalg.norm(plane, axis=0)
         w = inverse[at][:, None]
-        is_near = np.abs(rays[at] @ plane - w) <= limits.most_distance * w
-        return is_near & (-(normal[at] @ unit) >= limits.least_cosine)
+        is_near = np.abs(rays[at] @ plane - w) <= _MOST_DISTANCE * w
+        return is_near & (-(normal[at] @ unit) >= _LEAST_COSINE)
 
     for _ in range(_MOST_PLANES):
         free = np.nonzero(is_free)
-        if len(free[0]) < limits.least_share * valid.size:
+        if len(free[0]) < _LEAST_SHARE * valid.size:
             break
         some = dice.integers(0, len(free[0]), _N_POINTS)
         points = tuple(axis[some] for axis in free)
@@ -170,7 +160,7 @@ def large_planes(
             weights = 1 / inverse[pixels][:, None]
             plane = np.linalg.lstsq(rays[pixels] * weights, np.ones_like(weights), rcond=None)[0]
         pixels = tuple(axis[near(plane, free)[:, 0]] for axis in free)
-        if len(pixels[0]) < limits.least_share * valid.size:
+        if len(pixels[0]) < _LEAST_SHARE * valid.size:
             break
         planes[pixels] = -plane[:, 0] / np.linalg.norm(plane)
         is_free[pixels] = False
@@ -178,11 +168,7 @@ def large_planes(
 
 
 def _planes_of_triples(
-    points: tuple[NDArray[np.intp], ...],
-    is_free: Mask,
-    rays: F64,
-    inverse: F64,
-    dice: np.random.Generator,
+    points: _Pixels, is_free: Mask, rays: F64, inverse: F64, dice: np.random.Generator
 ) -> F64:
     """(3, n) planes a, b, c through triples of free pixels near each other."""
     height, width = is_free.shape
@@ -199,17 +185,8 @@ def _planes_of_triples(
 
 def smoothed_normals(normal: NDArray[Any], valid: Mask, radius: float = 0.025) -> F32:
     """(H, W, 3) unit mean of the valid normals in a square of this radius, a share of the width."""
-    reach = max(round(radius * valid.shape[1]), 1)
-    sums = np.pad(
-        np.where(valid[..., None], normal, 0).astype(np.float64), [(reach, reach)] * 2 + [(0, 0)]
-    )
-    for axis in (0, 1):
-        total = np.cumsum(sums, axis)
-        zero = np.zeros_like(np.take(total, [0], axis))
-        n = total.shape[axis] - 2 * reach
-        total = np.concatenate([zero, total], axis)
-        sums = np.take(total, range(2 * reach + 1, 2 * reach + 1 + n), axis) - np.take(
-            total, range(n), axis
-        )
+    side = 2 * max(round(radius * valid.shape[1]), 1) + 1
+    shown = np.where(valid[..., None], normal, 0).astype(np.float64)
+    sums = uniform_filter(shown, (side, side, 1), mode="constant")
     length = np.linalg.norm(sums, axis=-1, keepdims=True)
-    return np.asarray(sums / np.maximum(length, 1e-9), np.float32)
+    return np.asarray(sums / np.maximum(length, 1e-12), np.float32)
