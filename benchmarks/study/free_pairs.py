@@ -21,7 +21,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.assets.debian import cache_folder, fetched_deb
-from pbrs_farm.images import array_from_png
+from pbrs_farm.core.resampling import resized_by_area
+from pbrs_farm.images import array_from_png, decode_photo, png_from_array
 
 FOLDER: Final = cache_folder() / "free_pairs"
 _DESK: Final = Path(__file__).with_name("desk")
@@ -66,12 +67,14 @@ def _write_garage(out: Path) -> None:
 
 
 def _write_plant(out: Path) -> None:
-    """Middlebury 2006 (Scharstein and Pal 2007); disparities begin at 270."""
+    """Middlebury 2006 (Scharstein and Pal 2007), halved to the size of the others; disparities begin at 270."""
     files = fetched_deb(*_DEB).members(lambda name: name.startswith(f"{_PLANT}aloe"))
-    (out / "aloe_rgb.jpg").write_bytes(files[f"{_PLANT}aloeL.jpg"])
-    disparity = array_from_png(files[f"{_PLANT}aloeGT.png"], "aloeGT.png")
+    colour = decode_photo(files[f"{_PLANT}aloeL.jpg"], "aloeL.jpg")
+    disparity = array_from_png(files[f"{_PLANT}aloeGT.png"], "aloeGT.png")[::2, ::2]
+    height, width = disparity.shape
+    (out / "aloe_rgb.png").write_bytes(png_from_array(resized_by_area(colour, width, height)))
     _write_depth(out / "aloe_depth.npy", disparity, 0.16, 3740.0, 270.0)
-    _write_camera(out, 3740.0, disparity.shape[1] / 2, disparity.shape[0] / 2)
+    _write_camera(out, 3740.0 / 2, width / 2, height / 2)
 
 
 def _write_depth(

@@ -86,8 +86,7 @@ def _train(args: argparse.Namespace) -> None:
     # Report missing packages before reading views.
     device_of(plan)
     check_installed(args.log)
-    if args.export == "onnx":
-        check_onnx()
+    check_onnx(args.export)
     views, held_out = training_views(source, plan), held_out_views(source, plan)
     n_held = len(held_out) if held_out else 0
     lacking = left_out(source, plan)
@@ -121,11 +120,8 @@ def _train(args: argparse.Namespace) -> None:
         source.name,
         init,
         stop_on=stop_on,
-        facts={
-            "credits": list(dict.fromkeys(credits)),
-            "command": _command(args),
-            **facts_of(photographs, plan),
-        },
+        facts={"credits": list(dict.fromkeys(credits)), "command": _command(args)}
+        | facts_of(photographs, plan),
     )
     # Print about twenty of the logged steps.
     period = max(plan.steps // 20 // plan.log_every, 1) * plan.log_every
