@@ -105,9 +105,9 @@ def test_a_mark_that_is_no_table_is_told(page: Path, tmp_path: Path) -> None:
         written_tables(tmp_path / "docs", tmp_path)
 
 
-def test_each_simple_table_is_once_in_the_lab_book_with_its_rows() -> None:
+def test_each_simple_table_is_once_in_the_docs_with_its_rows() -> None:
     """The first cells of the table are on the page, whoever wrote it, so that figures elsewhere find them."""
-    text = "\n".join(p.read_text("utf-8") for p in (REPO / "docs/lab").glob("*.md"))
+    text = "\n".join(p.read_text("utf-8") for p in (REPO / "docs").rglob("*.md"))
     blocks = _BLOCK.findall(text)
     simple = {row.table for row in ROWS_OF_BOOK}
     assert sorted(name for name, _ in blocks if name in simple) == sorted(simple)

@@ -388,7 +388,7 @@ def notes(run: Trained, evaluations: list[Evaluation]) -> list[str]:
         lines.append(f"predictions of --on are {text}")
     if any(FLOOR in evaluation.rows for evaluation in evaluations):
         text = "the truth judged as a prediction, smoothed, and on large planes as measured"
-        lines.append(f"{FLOOR}, which no network goes below: {text}")
+        lines.append(f"{FLOOR}, about a perfect network's error: {text}")
     if _paper(run):
         lines.append("the paper's numbers are of other pictures, another truth and 568,793 views")
     return lines
