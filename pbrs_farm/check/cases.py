@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.check.certificate import Expect, Tally
-from pbrs_farm.check.embree_caster import Hits, Rays
+from pbrs_farm.check.embree_caster import Rays
 from pbrs_farm.check.fields import row_and_names
 from pbrs_farm.check.moved_house import MovedHouse, house_at
 from pbrs_farm.check.stored_files import stored_object
@@ -50,7 +50,7 @@ class Scene(NamedTuple):
     """Triangles, and rays among them."""
 
     triangles: Triangles
-    rays: Hits
+    rays: Rays
 
 
 @dataclass(frozen=True, eq=False)

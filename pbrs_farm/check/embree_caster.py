@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, NamedTuple, Protocol
+from typing import Any, NamedTuple
 
 import numpy as np
 import trimesh
@@ -16,16 +16,6 @@ _STEP = 1e-5  # behind a hole, relative to the largest coordinate plus 1 m: abov
 _MOST_REFLECTIONS = 8  # reflections; the next mirror counts as the hit
 _LEAST_COSINE = 0.02  # between a shading normal and the way back, to which it is bent
 _OFF = 2e-5  # distance off a mirror, relative to the largest coordinate plus 1 m
-
-
-class Hits(Protocol):
-    """First hits of rays: see Rays."""
-
-    def first(self, origin: F64, directions: F64) -> I64: ...
-    def distance(self, face: I64, origin: F64, directions: F64) -> F64: ...
-    def normal(self, face: I64, directions: F64) -> F64: ...
-    def without_holes(self, face: I64, origin: F64, directions: F64) -> I64: ...
-    def last_leg(self, origin: F64, directions: F64) -> tuple[F64, F64, F64]: ...
 
 
 class Rays:
@@ -125,7 +115,7 @@ class Rays:
         return np.where(face[:, None] >= 0, np.where(away, -normal, normal), 0.0)
 
 
-def is_visible(rays: Hits, eye: F64, points: F64, slack_m: Any) -> Bools:
+def is_visible(rays: Rays, eye: F64, points: F64, slack_m: Any) -> Bools:
     """(N,) True if rays from the eye to points (N, 3) hit nothing more than slack_m before them."""
     to = points - eye
     face = rays.first(eye, to)
@@ -164,7 +154,7 @@ class _Path(NamedTuple):
     mirrors: list[F64]  # (N, 3) normals of each reflection's mirrors; 0 = no mirror
 
 
-class MirrorRays:
+class MirrorRays(Rays):
     """First hits of an eye's rays, through mirrors: distances of the whole way, normals of the image."""
 
     def __init__(self, triangles: Triangles, rays: Rays, eye: F64) -> None:

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from pbrs_farm.check.cases import Pixels
-from pbrs_farm.check.embree_caster import Hits, is_visible
+from pbrs_farm.check.embree_caster import Rays, is_visible
 from pbrs_farm.check.lens_rays import PlacedCamera, StoredCamera
 from pbrs_farm.check.stored_view import StoredView
 from pbrs_farm.core.arrays import F64, I64, Bools
@@ -36,7 +36,7 @@ def partner_of(view: StoredView, relation: str) -> PlacedCamera | None:
     return PlacedCamera(np.array(row["K"], np.float64), pose, view.size, view.lens)
 
 
-def is_seen(points: F64, other: StoredCamera, rays: Hits, slack_m: float = 0) -> Bools:
+def is_seen(points: F64, other: StoredCamera, rays: Rays, slack_m: float = 0) -> Bools:
     """(N,) True if nothing is between the other eye and a point, beyond the error of 32-bit rays."""
     distance = np.linalg.norm(points - other.eye, axis=1)
     return is_visible(rays, other.eye, points, slack_m + _REACH * (1 + distance))
@@ -51,7 +51,7 @@ class Followed:
 
 
 def follow_points(
-    view: StoredView, other: StoredCamera, pixels: Pixels, z: F64, rays: Hits, carry: Carry = stay
+    view: StoredView, other: StoredCamera, pixels: Pixels, z: F64, rays: Rays, carry: Carry = stay
 ) -> Followed:
     """Follow the surfaces at depth z (N,) metres behind pixels' centres into the other picture.
 
@@ -66,7 +66,7 @@ def follow_points(
 
 
 def near_edge(
-    view: StoredView, other: StoredCamera, pixels: Pixels, z: F64, rays: Hits, carry: Carry = stay
+    view: StoredView, other: StoredCamera, pixels: Pixels, z: F64, rays: Rays, carry: Carry = stay
 ) -> Bools:
     """(N,) True near the other picture's border or an obstacle, where another state is right, too; five casts."""
     rows, columns = pixels

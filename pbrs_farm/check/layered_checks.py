@@ -16,7 +16,7 @@ import numpy as np
 from pbrs_farm.check.axes import dot
 from pbrs_farm.check.cases import ViewCase
 from pbrs_farm.check.checks import Check
-from pbrs_farm.check.embree_caster import Hits, Rays
+from pbrs_farm.check.embree_caster import Rays
 from pbrs_farm.check.pixel_checks import distances_pierced
 from pbrs_farm.core.arrays import F64, I64, Bools
 
@@ -77,7 +77,7 @@ def check_depth_layers(case: ViewCase) -> None:
         case.tally.fail(check, case.place, f"row {row}, column {column}")
 
 
-def _crossed_faces(rays: Hits, origin: F64, directions: F64) -> I64:
+def _crossed_faces(rays: Rays, origin: F64, directions: F64) -> I64:
     """(N, K) the triangles that each ray crosses, nearest first, -1 = none."""
     faces = np.full((len(directions), _CROSSINGS), -1, np.int64)
     on, way = np.arange(len(directions)), np.zeros(len(directions))

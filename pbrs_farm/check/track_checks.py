@@ -17,7 +17,7 @@ from pbrs_farm.check.axes import dot, opencv_pose
 from pbrs_farm.check.cases import HouseCase, Scenes
 from pbrs_farm.check.certificate import Expect, Tally
 from pbrs_farm.check.checks import Check
-from pbrs_farm.check.embree_caster import Hits, Rays, is_visible
+from pbrs_farm.check.embree_caster import Rays, is_visible
 from pbrs_farm.check.followed_points import is_seen
 from pbrs_farm.check.lens_rays import PlacedCamera, StoredCamera, StoredLens, scaled_k
 from pbrs_farm.check.rules import judge
@@ -181,7 +181,7 @@ def place_slack_px(px: F64, depth: F64) -> F64:
         return np.asarray(_PX + share * np.abs(px).max(axis=1))
 
 
-def _may_be_either(points: F64, other: StoredCamera, margin: F64, rays: Hits) -> Bools:
+def _may_be_either(points: F64, other: StoredCamera, margin: F64, rays: Rays) -> Bools:
     """(N,) True on the picture's border, or beside an obstacle."""
     with np.errstate(invalid="ignore"):
         is_tie = np.asarray(np.abs(margin) <= _PX, bool)

@@ -129,14 +129,8 @@ def _tone_of(view_json: bytes, recipe: bytes) -> ToneFields:
 def _tone_facts(tone: ToneFields) -> dict[str, Any]:
     from pbrs_farm.transport.develop.tone_mapping import knee_of
 
-    facts = {"preset": tone.preset, "key": tone.key, "white_balance": tone.white_balance}
-    facts |= {"exposure_ev": tone.exposure_ev, "contrast": tone.contrast, "flare": tone.flare}
-    return facts | {
-        "warmth_ev": tone.warmth_ev,
-        "tint_ev": tone.tint_ev,
-        "white": tone.white,
-        "knee": knee_of(tone.white),
-    }
+    names = "preset key white_balance exposure_ev contrast flare warmth_ev tint_ev white"
+    return {n: getattr(tone, n) for n in names.split()} | {"knee": knee_of(tone.white)}
 
 
 def _view_files(data: bytes) -> tuple[Sequence[bytes], bool]:
