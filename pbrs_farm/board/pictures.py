@@ -39,7 +39,7 @@ PLANES: Final[tuple[tuple[str, int, str, tuple[int, ...]], ...]] = (
     ("semantic", 8, "<u1", ()),
 )
 _LOG: Final = logging.getLogger(__name__)
-MAX_BYTES: Final = 4 * 10**9  # of the folder; the oldest files are removed first
+_MAX_BYTES: Final = 4 * 10**9  # of the folder; the oldest files are removed first
 _AT_ONCE: Final = 2  # number of pictures made in parallel
 _SWEEP_EVERY: Final = 2000  # number of new pictures between two checks of the folder's size
 
@@ -84,9 +84,8 @@ def packet(layers: Mapping[str, NDArray[Any]]) -> bytes:
 class PictureCache:
     """Pictures by their words."""
 
-    def __init__(self, folder: Path, *, max_bytes: int = MAX_BYTES) -> None:
+    def __init__(self, folder: Path) -> None:
         self.folder = folder
-        self._max_bytes = max_bytes
         self._making = threading.Semaphore(_AT_ONCE)
         self._n_made = 0
         self.folder.mkdir(parents=True, exist_ok=True)
@@ -133,7 +132,7 @@ class PictureCache:
         files = sorted(
             (e.stat().st_mtime, e.stat().st_size, e.path) for e in _cached_files(self.folder)
         )
-        excess = sum(size for _time, size, _path in files) - self._max_bytes
+        excess = sum(size for _time, size, _path in files) - _MAX_BYTES
         for _time, size, path in files:
             if excess <= 0:
                 return

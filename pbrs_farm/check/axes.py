@@ -63,13 +63,13 @@ def dot(a: NDArray[Any], b: NDArray[Any]) -> F64:
     return np.asarray(np.einsum("...i,...i->...", a, b))
 
 
-def is_rigid(pose: F64, tolerance: float = 1e-6) -> bool:
+def is_rigid(pose: F64) -> bool:
     """True if a (4, 4) matrix is a rotation and a translation."""
     is_affine = pose.shape == (4, 4) and bool((pose[3] == [0, 0, 0, 1]).all())
-    return is_affine and is_rotation(pose[:3, :3], tolerance)
+    return is_affine and is_rotation(pose[:3, :3])
 
 
-def is_rotation(matrix: F64, tolerance: float = 1e-6) -> bool:
+def is_rotation(matrix: F64) -> bool:
     """True if a (3, 3) matrix is a rotation without mirroring."""
     off = np.abs(matrix @ matrix.T - np.eye(3)).max()
-    return bool(off <= tolerance and np.linalg.det(matrix) > 0)
+    return bool(off <= 1e-6 and np.linalg.det(matrix) > 0)

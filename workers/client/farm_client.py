@@ -22,6 +22,7 @@ from pbrs_farm.core.errors import BadInput, MachineFailed, ObjectMissing
 from pbrs_farm.core.shown_text import did_you_mean
 from pbrs_farm.store import Store, store_from_url
 from workers.client.rights import Rights
+from workers.client.task_rows import explain_tasks, rerun_command
 from workers.config import FarmConfig
 from workers.coordinator.progress_rates import stage_views
 from workers.ids import (
@@ -42,7 +43,6 @@ from workers.store_identity import known_store_id, store_id
 if TYPE_CHECKING:
     from pbrs_farm.core.recipe import Recipe
     from workers.job import HouseEntry, JobSpec
-from workers.client.task_rows import explain_tasks, rerun_command
 
 # A submission that takes longer has died; the next one starts afresh.
 _LOADING_S = 900.0

@@ -56,8 +56,10 @@ def garbage(farm: Farm, keep_s: float, now_s: float) -> list[Garbage]:
     store = farm.store
     states = {job: _state_of_job(farm, job) for job in jobs_in(store)}
     is_old = _older_than(store, now_s - keep_s)
-    logs = _logs(store, [job for job, state in states.items() if state not in _LIVE])
-    cancelled = _files_of(store, [job for job, state in states.items() if state == "cancelled"])
+    ended = (job for job, state in states.items() if state not in _LIVE)
+    logs = (key for job in ended for key in store.list(job_key(job, "logs/")))
+    gone = (job for job, state in states.items() if state == "cancelled")
+    cancelled = (key for job in gone for key in store.list(f"jobs/{job}/"))
     working = {
         house for job, s in states.items() if s in _LIVE for house in _houses_of_job(store, job)
     }
@@ -105,16 +107,6 @@ def _older_than(store: Store, oldest_s: float) -> Callable[[str], int | None]:
         return None if head is None or head.modified_s >= oldest_s else head.n_bytes
 
     return size
-
-
-def _logs(store: Store, jobs: Iterable[str]) -> Iterator[str]:
-    for job in jobs:
-        yield from store.list(job_key(job, "logs/"))
-
-
-def _files_of(store: Store, jobs: Iterable[str]) -> Iterator[str]:
-    for job in jobs:
-        yield from store.list(f"jobs/{job}/")
 
 
 def _houses_of_job(store: Store, job: str) -> list[str]:

@@ -3,16 +3,13 @@
 from __future__ import annotations
 
 import json
-from typing import TYPE_CHECKING, Any
+from typing import Any
 
 from pbrs_farm.core.errors import BadInput
 from workers.ids import LIGHT, LIGHT_GPU, WHOLE, TaskId, queue_of, task_from_text
 from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.task_ledger import ALIVE_S, STATES, JobView, hold_from_text
 from workers.ledger.worker_registry import Registry
-
-if TYPE_CHECKING:
-    pass
 
 _TEXTS = {letter: name.lower() for name, letter in STATES.items()} | {
     STATES["LOADED"]: "waiting: its house is not admitted yet",

@@ -105,7 +105,8 @@ def view_json(request: Request) -> Response:
     data = board_of(request).reader.get_or_none(key)
     if data is None:
         raise HTTPException(404, "This view has no view.json yet.")
-    return download(data, f"{entry.house}-{entry.id}-view.json")
+    name = f"{entry.house}-{entry.id}-view.json"
+    return Response(data, media_type=content_type(name), headers=_saved_as(name))
 
 
 def pixels(request: Request) -> Response:
@@ -119,18 +120,8 @@ def pixels(request: Request) -> Response:
                 arrays[layer] = layer_from_bytes(layer, data, key)
             except (PbrsError, HTTPException):
                 continue
-    return gzip_response(packet(arrays))
-
-
-def gzip_response(data: bytes, cache: str = FOREVER) -> Response:
-    """Bytes for a script, compressed."""
-    headers = {"Content-Encoding": "gzip", "Cache-Control": cache}
-    return Response(gzip.compress(data, 1, mtime=0), headers=headers)
-
-
-def download(data: bytes, name: str) -> Response:
-    """A download with a file name."""
-    return Response(data, media_type=content_type(name), headers=_saved_as(name))
+    headers = {"Content-Encoding": "gzip", "Cache-Control": FOREVER}
+    return Response(gzip.compress(packet(arrays), 1, mtime=0), headers=headers)
 
 
 def _saved_as(name: str) -> dict[str, str]:
