@@ -7,6 +7,7 @@ neighbours, and the mean over flat surfaces near 0.
 
 from __future__ import annotations
 
+from pathlib import Path
 from typing import NamedTuple
 
 import numpy as np
@@ -19,36 +20,31 @@ from pbrs_farm.check.colours import linear_from_srgb, srgb_from_linear
 from pbrs_farm.check.embree_caster import is_visible
 from pbrs_farm.check.pixel_checks import albedo_of
 from pbrs_farm.core.arrays import F64, Bools
+from pbrs_farm.core.record import Record, read_csv
 
 _HHA_STEPS = 1.51  # of 255: rounding, and half a millimetre of depth
 _SATURATED_MM = 65535
 
-# Disparity of the sensors that match patterns: px times metres, steps of a px, noise in px, reach in m.
-_MATCHING = {
-    "depth_sensor": (580.0 * 0.075, 8, 1 / 6, (0.5, 8.0)),
-    "depth_sensor_stereo": (447.0 * 0.05, 32, 0.08, (0.0, 10.0)),
-    "depth_sensor_d455": (455.0 * 0.095, 32, 0.08, (0.0, 20.0)),
-}
-# Reach in m of those that time light; their noise is in _tof_sigma_m.
-_TOF_REACH_M = {
-    "depth_sensor_tof": (0.5, 4.5),
-    "depth_sensor_azure": (0.5, 3.86),
-    "depth_sensor_l515": (0.25, 9.0),
-}
+
+class _Sensor(Record):
+    """A row of sensors.csv."""
+
+    sensor: str
+    focal_px: float = 0.0
+    baseline_m: float = 0.0
+    steps: int = 0
+    noise_px: float = 0.0
+    nearest_m: float
+    farthest_m: float
+    reflectance: float
+    largest_angle_deg: float = 180.0
+    grain_px2: float = 1.0
+
+
+_SENSORS = {row.sensor: row for row in read_csv(Path(__file__).with_name("sensors.csv"), _Sensor)}
 # Layer of reasons -> its sensor; the reasons, by their numbers.
-_HOLES = {name.replace("sensor", "hole"): name for name in (*_MATCHING, *_TOF_REACH_M)}
+_HOLES = {name.replace("sensor", "hole"): name for name in _SENSORS}
 _CLEAR, _MIRROR, _TOO_DARK, _TOO_NEAR, _TOO_FAR, _GRAZING, _SHADOW, _EDGE = range(1, 9)
-# Assumed least light that a sensor needs, share over m^2: of 95 % or 15 % reflectance at the farthest reach.
-_LEAST_RETURN = {
-    "depth_sensor": 0.95 / 8.0**2,
-    "depth_sensor_stereo": 0.95 / 10.0**2,
-    "depth_sensor_d455": 0.95 / 20.0**2,
-    "depth_sensor_tof": 0.15 / 4.5**2,
-    "depth_sensor_azure": 0.15 / 3.86**2,
-    "depth_sensor_l515": 0.95 / 9.0**2,
-}
-_LARGEST_ANGLE_DEG = {"depth_sensor": 82.0, **dict.fromkeys(_TOF_REACH_M, 85.0)}
-_BASELINE_M = {"depth_sensor": 0.075, "depth_sensor_stereo": 0.05, "depth_sensor_d455": 0.095}
 _MOST_DISPARITY_PX = 126.0
 _FAR_SHARE = 0.75  # of the farthest reach, from which noise may exceed it
 _COLOUR_STEPS = 2.5  # of 255
@@ -56,8 +52,6 @@ _SIGMAS = 6.5  # of noise, for a pixel
 _FLAT_SIGMAS = 0.8  # of noise: range of the neighbours of a flat pixel
 _SLANT_SIGMAS = 8.0  # the same of a time-of-flight sensor
 _BIAS_SIGMAS = 0.35  # of noise: largest mean over flat pixels
-# Pixels that share their noise.
-_GRAIN_PX2 = {"depth_sensor": 81.0, "depth_sensor_stereo": 28.0, "depth_sensor_d455": 28.0}
 _LEAST_ALIKE = 0.3  # correlation of neighbours' noise, where a sensor matches blocks
 _SPREAD = (0.6, 1.5)  # noise of flat pixels over the expected one
 _LEAST_MEASURED = 0.25  # share of flat pixels within reach
@@ -78,17 +72,14 @@ def check_derived(case: ViewCase) -> None:
     """Judge hha by its formula, noisy depth by its neighbours' range and its mean over flat surfaces."""
     if "hha" in case.arrays:
         _check_hha(case)
-    for name in _MATCHING:
+    for name, sensor in _SENSORS.items():
         if name in case.arrays:
-            _check_matching(case, name)
-    for name in _TOF_REACH_M:
-        if name in case.arrays:
-            _check_tof(case, name)
+            (_check_matching if sensor.focal_px else _check_tof)(case, sensor)
     if any(name in case.arrays for name in _HOLES):
         seen = _seen_by_sensors(case)
-        for name, sensor in _HOLES.items():
-            if name in case.arrays:
-                _check_holes(case, name, sensor, seen)
+        for hole, name in _HOLES.items():
+            if hole in case.arrays:
+                _check_holes(case, hole, _SENSORS[name], seen)
 
 
 def _check_hha(case: ViewCase) -> None:
@@ -115,16 +106,15 @@ def _check_hha(case: ViewCase) -> None:
     case.tally.pixels("hha", case.place, np.where(hit, right, nothing))
 
 
-def _check_matching(case: ViewCase, name: str) -> None:
+def _check_matching(case: ViewCase, sensor: _Sensor) -> None:
     """A sensor that measures disparity in steps: each value is a step, near those of its neighbours."""
-    stored, depth = case.arrays[name], case.arrays["depth"]
-    fb, steps, noise, (nearest, farthest) = _MATCHING[name]
+    stored, depth = case.arrays[sensor.sensor], case.arrays["depth"]
+    fb, steps, noise = sensor.focal_px * sensor.baseline_m, sensor.steps, sensor.noise_px
     measured = stored > 0
     metres = np.where(measured, stored / 1000, 1.0)
     # The step of the stored depth, if there is one.
     step = np.rint(fb / metres * steps)
     fits = np.abs(np.rint(fb * steps / np.maximum(step, 1) * 1000) - stored) <= 0.5
-    in_reach = (metres >= nearest - 0.001) & (metres <= farthest + 0.001)
     with np.errstate(divide="ignore"):
         true = np.where(depth > 0, fb / (depth / 1000), np.nan)
     low, high = _extremes(true)
@@ -134,31 +124,38 @@ def _check_matching(case: ViewCase, name: str) -> None:
         near = (disparity >= low - slack) & (disparity <= high + slack)
         is_flat = (high - low < _FLAT_SIGMAS * noise) & (depth > 0)
         # Depths that noise does not push out of reach.
-        is_flat &= (fb / true > nearest * 1.1) & (fb / true < farthest * 0.8)
-    case.tally.pixels(f"{name}: values", case.place, ~measured | (fits & in_reach & near))
-    _check_statistics(case, name, (disparity - true) / noise, measured, is_flat)
+        is_flat &= (fb / true > sensor.nearest_m * 1.1) & (fb / true < sensor.farthest_m * 0.8)
+    _check_values(case, sensor, fits & near, (disparity - true) / noise, is_flat)
 
 
-def _check_tof(case: ViewCase, name: str) -> None:
+def _check_tof(case: ViewCase, sensor: _Sensor) -> None:
     """A sensor that times light: noise by distance and slant."""
-    stored, depth, reach_m = case.arrays[name], case.arrays["depth"], _TOF_REACH_M[name]
+    stored, depth = case.arrays[sensor.sensor], case.arrays["depth"]
     rays = case.view.ray_grid()
     normals = world_normals(case.arrays["normal"], case.view.world_from_camera)
     cosine = np.abs(dot(normals, rays)) / np.linalg.norm(rays, axis=-1)
     angle = np.minimum(np.arccos(np.clip(cosine, 0, 1)), np.radians(85))
     true = np.where(depth > 0, depth / 1000, np.nan)
     low, high = _extremes(true)
-    sigma = _tof_sigma_m(name, high, angle)
-    metres, measured = stored / 1000, stored > 0
-    in_reach = (metres >= reach_m[0] - 0.001) & (metres <= reach_m[1] + 0.001)
+    sigma, metres = _tof_sigma_m(sensor.sensor, high, angle), stored / 1000
     slack = _SIGMAS * sigma + 0.001
     with np.errstate(invalid="ignore"):
         near = (metres >= low - slack) & (metres <= high + slack)
         # It measures the pixel itself, so that a slant moves nothing.
         is_flat = (high - low < _SLANT_SIGMAS * sigma) & (depth > 0)
-        is_flat &= (true > reach_m[0] * 1.1) & (true < reach_m[1] * 0.9)
-    case.tally.pixels(f"{name}: values", case.place, ~measured | (in_reach & near))
-    _check_statistics(case, name, (metres - true) / sigma, measured, is_flat)
+        is_flat &= (true > sensor.nearest_m * 1.1) & (true < sensor.farthest_m * 0.9)
+    _check_values(case, sensor, near, (metres - true) / sigma, is_flat)
+
+
+def _check_values(
+    case: ViewCase, sensor: _Sensor, right: Bools, error: F64, is_flat: Bools
+) -> None:
+    """Measured values are right and within reach (error: in sigmas)."""
+    metres = case.arrays[sensor.sensor] / 1000
+    in_reach = (metres >= sensor.nearest_m - 0.001) & (metres <= sensor.farthest_m + 0.001)
+    right = (metres == 0) | (right & in_reach)
+    case.tally.pixels(f"{sensor.sensor}: values", case.place, right)
+    _check_statistics(case, sensor, error, metres > 0, is_flat)
 
 
 def _tof_sigma_m(name: str, z: F64, angle: F64) -> F64:
@@ -211,24 +208,25 @@ def _seen_by_sensors(case: ViewCase) -> _Seen:
     return _Seen(*(np.asarray(a).reshape(shape) for a in arrays))
 
 
-def _check_holes(case: ViewCase, name: str, sensor: str, seen: _Seen) -> None:
+def _check_holes(case: ViewCase, name: str, sensor: _Sensor, seen: _Seen) -> None:
     """Each reason holds beside the pixel, and only pixels with a reason lack a measurement."""
     stored, nothing = case.arrays[name], seen.z == 0
-    (nearest, farthest), least = _sensor_reach(sensor), _LEAST_RETURN[sensor]
+    least = sensor.reflectance / sensor.farthest_m**2  # assumed least light, share over m^2
+    # The nearest that the search of a stereo camera finds.
+    nearest = sensor.nearest_m or sensor.focal_px * sensor.baseline_m / _MOST_DISPARITY_PX
     near_z = np.where(nothing, np.inf, seen.z)
     reasons = {
         _CLEAR: seen.clear,
         _MIRROR: seen.mirror,
         _TOO_DARK: ~nothing & (seen.least_return < least),
         _TOO_NEAR: near_z < nearest * 1.1,
-        _TOO_FAR: near_z > farthest * _FAR_SHARE,
+        _TOO_FAR: near_z > sensor.farthest_m * _FAR_SHARE,
     }
-    if sensor in _LARGEST_ANGLE_DEG:
-        steep = seen.angle > np.radians(_LARGEST_ANGLE_DEG[sensor] - 0.1)
-        reasons[_GRAZING] = ~nothing & steep
-    if sensor in _BASELINE_M:
+    steep = seen.angle > np.radians(sensor.largest_angle_deg - 0.1)
+    reasons[_GRAZING] = ~nothing & steep
+    if sensor.baseline_m:
         reasons[_SHADOW] = _in_shadow(case, sensor, near_z)
-    if sensor == "depth_sensor_azure":
+    if sensor.sensor == "depth_sensor_azure":
         low, high = (
             f(near_z, 3, mode="nearest") for f in (ndimage.minimum_filter, ndimage.maximum_filter)
         )
@@ -241,33 +239,26 @@ def _check_holes(case: ViewCase, name: str, sensor: str, seen: _Seen) -> None:
     # A surface that no sensor measures, with nothing else about it.
     blind = seen.clear | seen.mirror | nothing | (seen.most_return < least)
     right &= ~((stored == 0) & ndimage.minimum_filter(blind, _REACH_PX, mode="nearest"))
-    if sensor in case.arrays:
-        measured = case.arrays[sensor] > 0
+    if sensor.sensor in case.arrays:
+        measured = case.arrays[sensor.sensor] > 0
         by_material = np.isin(stored, (0, _CLEAR, _MIRROR, _TOO_DARK))
         right &= np.where(measured, by_material, stored > 0)
     case.tally.pixels("depth holes", f"{case.place}/{name}.png", right)
 
 
-def _sensor_reach(sensor: str) -> tuple[float, float]:
-    """Nearest and farthest depth in m; of stereo cameras the nearest that their search of 126 px finds."""
-    if sensor in _TOF_REACH_M:
-        return _TOF_REACH_M[sensor]
-    fb, _steps, _noise, (nearest, farthest) = _MATCHING[sensor]
-    return nearest or fb / _MOST_DISPARITY_PX, farthest
-
-
-def _in_shadow(case: ViewCase, sensor: str, z: F64) -> Bools:
+def _in_shadow(case: ViewCase, sensor: _Sensor, z: F64) -> Bools:
     """(H, W) pixels that a surface to the right hides from a point beside the camera, or outside its picture."""
-    if sensor != "depth_sensor":
+    is_kinect = sensor.sensor == "depth_sensor"
+    if not is_kinect:
         size = max(round(5 * z.shape[1] / 848) | 1, 3)
         z = ndimage.minimum_filter(z, size, mode="nearest")
-    places = np.arange(z.shape[1]) - case.view.k[0, 0] * _BASELINE_M[sensor] / z
+    places = np.arange(z.shape[1]) - case.view.k[0, 0] * sensor.baseline_m / z
     hidden = np.zeros(z.shape, bool)
     first = places[:, -1]
     for column in range(z.shape[1] - 1, -1, -1):
         first = np.minimum(first, places[:, column])
         hidden[:, column] = places[:, column] > first + 0.4
-    return hidden | (places < -0.4) if sensor != "depth_sensor" else hidden
+    return hidden if is_kinect else hidden | (places < -0.4)
 
 
 def _extremes(values: F64) -> tuple[F64, F64]:
@@ -279,25 +270,25 @@ def _extremes(values: F64) -> tuple[F64, F64]:
 
 
 def _check_statistics(
-    case: ViewCase, name: str, error: F64, measured: Bools, is_flat: Bools
+    case: ViewCase, sensor: _Sensor, error: F64, measured: Bools, is_flat: Bools
 ) -> None:
     """Flat surfaces have mostly measured pixels, a mean error near 0 and the expected noise (error: in sigmas)."""
     n = int(is_flat.sum())
     if n < _FEW:
         return
-    expect, chosen = case.expect(f"{name}: statistics"), is_flat & measured
+    expect, chosen = case.expect(f"{sensor.sensor}: statistics"), is_flat & measured
     share = chosen.sum() / n
     fault = f"measures {share:.0%} of flat surfaces within reach"
     if not expect(share >= _LEAST_MEASURED, fault):
         return
     bias, spread = float(np.mean(error[chosen])), float(np.std(error[chosen]))
     # Pixels that share their noise count once.
-    chance = 4 * np.sqrt(_GRAIN_PX2.get(name, 1.0) / chosen.sum())
+    chance = 4 * np.sqrt(sensor.grain_px2 / chosen.sum())
     fault = f"is off by {bias:.2f} standard deviations in the mean"
     expect(abs(bias) <= _BIAS_SIGMAS + chance, fault)
     if chance > _FEW_BLOCKS:
         return
-    if name in _GRAIN_PX2:
+    if sensor.grain_px2 > 1:
         pair = chosen[:, 1:] & chosen[:, :-1]
         alike = float(np.corrcoef(error[:, 1:][pair], error[:, :-1][pair])[0, 1])
         expect(
@@ -361,7 +352,7 @@ CHECKS = (
         "view",
         check_derived,
         15,
-        ("hha", *_MATCHING, *_TOF_REACH_M, *_HOLES),
+        ("hha", *_SENSORS, *_HOLES),
         {f"{name}.png": "each reason holds for a surface beside the pixel" for name in _HOLES},
     ),
     Check("projector", "view", check_projector, 18, ("projector",)),
