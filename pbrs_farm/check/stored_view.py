@@ -42,7 +42,7 @@ class StoredView(StoredCamera):
         return Shot.of_row(self.folder.name, self.table)
 
     @cached_property
-    def size(self) -> tuple[int, int]:
+    def size(self) -> tuple[int, int]:  # type: ignore[override]
         """(height, width) in pixels."""
         return int(self.table["height_px"]), int(self.table["width_px"])
 
@@ -56,17 +56,17 @@ class StoredView(StoredCamera):
             return None
 
     @cached_property
-    def k(self) -> F64:
+    def k(self) -> F64:  # type: ignore[override]
         """(3, 3) K."""
         return np.array(self.table["K"], np.float64)
 
     @cached_property
-    def lens(self) -> StoredLens | None:
+    def lens(self) -> StoredLens | None:  # type: ignore[override]
         """The lens, None for a pinhole."""
         return StoredLens.of(self.table["lens"]) if "lens" in self.table else None
 
     @cached_property
-    def world_from_camera(self) -> F64:
+    def world_from_camera(self) -> F64:  # type: ignore[override]
         """(4, 4) pose with OpenCV axes (x right, y down, z forward)."""
         return np.array(self.table["world_from_camera_opencv"], np.float64)
 

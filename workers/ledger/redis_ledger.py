@@ -97,7 +97,7 @@ class _Client(redis.Redis):
 
     def execute_command(self, *args: Any, **options: Any) -> Any:
         with _errors(self.where):
-            return super().execute_command(*args, **options)
+            return super().execute_command(*args, **options)  # type: ignore[no-untyped-call]
 
     def pipeline(self, transaction: bool = True, shard_hint: Any = None) -> _Pipeline:
         pipe = _Pipeline(self.connection_pool, self.response_callbacks, transaction, shard_hint)
@@ -116,7 +116,7 @@ def redis_client(config: FarmConfig) -> Any:
     # TLS with a checked certificate, or none at all.
     ca = {"ssl_ca_certs": config.redis_ca} if config.redis_ca else {}
     tls: dict[str, Any] = {"ssl_cert_reqs": "required", **ca} if url.startswith("rediss:") else {}
-    client = _Client.from_url(
+    client: Any = _Client.from_url(
         url,
         decode_responses=True,
         socket_timeout=ANSWER_S,
