@@ -10,7 +10,7 @@ Effects: reads views, writes files.
 from __future__ import annotations
 
 from collections.abc import Iterator
-from itertools import count, starmap
+from itertools import starmap
 from pathlib import Path
 from typing import Final
 
@@ -46,14 +46,8 @@ def write_fsd(views: list[ChosenView], out: Path, _choice: Choice) -> None:
 def _pairs(views: list[ChosenView]) -> Iterator[tuple[ChosenView, ChosenView, int]]:
     """The left and the right view of each pair, and its number in its house."""
     for frames in frames_by_house(views).values():
-        pairs = ((f.first, f.right) for f in frames)
-        numbers = count()
-        yield from ((left, right, next(numbers)) for left, right in pairs if right is not None)
-
-
-def _paired(views: list[ChosenView]) -> list[ChosenView]:
-    paired = {id(view) for left, right, _number in _pairs(views) for view in (left, right)}
-    return [view for view in views if id(view) in paired]
+        pairs = [(f.first, right) for f in frames if (right := f.right) is not None]
+        yield from ((left, right, number) for number, (left, right) in enumerate(pairs))
 
 
 def _files(left: ChosenView, right: ChosenView, number: int) -> Files:
@@ -100,7 +94,12 @@ FORM = ViewForm(
     "fsd",
     write_fsd,
     "FoundationStereo's pairs: `<house>/dataset/data/left/rgb`, `right/rgb`, `left/disparity`, `left/intrinsics`, `index.txt`",
-    takes=Takes(_paired, "has no right view", "no view has a right one", _HINT),
+    takes=Takes(
+        lambda views: [view for *pair, _number in _pairs(views) for view in pair],
+        "has no right view",
+        "no view has a right one",
+        _HINT,
+    ),
     lenses=("pinhole",),
     layers=("depth_z", "disparity"),
     convention=Convention(0, axes="", depth="1000 steps a px of disparity"),

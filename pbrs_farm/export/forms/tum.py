@@ -36,11 +36,6 @@ def _timed(views: Sequence[ChosenView]) -> Iterator[tuple[ChosenView, float]]:
                 yield from ((view, frame.time_s) for view in (frame.first, *frame.others.values()))
 
 
-def _of_sequences(views: list[ChosenView]) -> list[ChosenView]:
-    timed = {id(view) for view, _time in _timed(views)}
-    return [view for view in views if id(view) in timed]
-
-
 def _files(view: ChosenView, time: float) -> Files:
     side = view.shot.eye and f"_{view.shot.eye}"
     names = {kind: f"{kind}{side}/{time:.6f}.png" for kind in ("rgb", "depth")}
@@ -62,7 +57,7 @@ FORM = ViewForm(
     "`rgb.txt`, `depth.txt`, `groundtruth.txt`; depth 5000 a metre; the right views of pairs in"
     " `rgb_right.txt`, `depth_right.txt`, `groundtruth_right.txt`, other cameras of a rig likewise",
     takes=Takes(
-        _of_sequences,
+        lambda views: [view for view, _time in _timed(views)],
         "has no frame of an exported sequence",
         "no view is a frame of a sequence",
         "pbrs-farm run HOME --cameras walk",
