@@ -57,7 +57,7 @@ def surface_points(corners: F64, spacing_m: float = SPACING_M, box: F64 | None =
     if box is None:
         return points
     inside = (points > box[0]) & (points < box[1])
-    return points[inside[:, 0] & inside[:, 1] & inside[:, 2]]
+    return np.asarray(points[inside[:, 0] & inside[:, 1] & inside[:, 2]])
 
 
 def spread_points(corners: F64, spacing_m: float) -> tuple[F64, NDArray[np.int64]]:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import cached_property
 
@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.catalogue import Piece
 from pbrs_farm.core.house import Item
-from pbrs_farm.core.mesh import edges_are_paired, points_bounds, signed_volume, triangle_bounds
+from pbrs_farm.core.mesh import edges_are_paired, points_bounds, signed_volume
 from pbrs_farm.dress.mutable_house import ADDED_TAG, MutableHouse
 from pbrs_farm.geometry.connected import connected_faces
 from pbrs_farm.geometry.surface_points import item_triangles
@@ -58,9 +58,9 @@ class Body:
         return self.piece.group if self.piece else ""
 
     @cached_property
-    def shells(self) -> Shells:
+    def shells(self) -> list[Shell]:
         """Its connected parts."""
-        return Shells(self.corners)
+        return shells_of(self.corners)
 
     @cached_property
     def swept(self) -> list[Swept]:
@@ -116,34 +116,16 @@ def has_same_mesh(a: Item, b: Item) -> bool:
     return np.array_equal(mine[order], theirs[other_order])
 
 
-class Shells:
-    """The connected parts of triangles (F, 3, 3), joined at corners equal to the bit; each is made when asked for.
-
-    Degenerate triangles are left out.
-    """
-
-    def __init__(self, corners: F64) -> None:
-        faces, self._vertices = welded(corners)
-        a, b, c = faces.T
-        faces = faces[(a != b) & (b != c) & (c != a)]
-        of_face = connected_faces(faces)
-        order = np.argsort(of_face, kind="stable")
-        self._faces, of_face = faces[order], of_face[order]
-        starts = np.flatnonzero(np.diff(of_face, prepend=-1))
-        self._ends = np.append(starts, len(of_face))
-        least, most = triangle_bounds(self._vertices[self._faces])
-        self.low: F64 = np.minimum.reduceat(least, starts)  # (S, 3) metres
-        self.high: F64 = np.maximum.reduceat(most, starts)
-        self._made: dict[int, Shell] = {}
-
-    def __iter__(self) -> Iterator[Shell]:
-        return map(self.__getitem__, range(len(self._ends) - 1))
-
-    def __getitem__(self, number: int) -> Shell:
-        if number not in self._made:
-            first, end = self._ends[number : number + 2]
-            self._made[number] = _shell(self._vertices, self._faces[first:end])
-        return self._made[number]
+def shells_of(corners: F64) -> list[Shell]:
+    """The connected parts of triangles (F, 3, 3), joined at corners equal to the bit, degenerate ones left out."""
+    faces, vertices = welded(corners)
+    faces = faces[(faces != np.roll(faces, 1, axis=1)).all(1)]
+    if not len(faces):
+        return []
+    of_face = connected_faces(faces)
+    order = np.argsort(of_face, kind="stable")
+    cuts = np.flatnonzero(np.diff(of_face[order])) + 1
+    return [_shell(vertices, faces[rows]) for rows in np.split(order, cuts)]
 
 
 def _shell(vertices: F64, faces: Faces) -> Shell:

@@ -63,9 +63,7 @@ def penetration_m(a: Body, b: Body, solids: Solids) -> float:
 
 
 def _shells_near(body: Body, other: Body) -> list[Shell]:
-    shells = body.shells
-    depths = _box_depth(other.low, other.high, shells.low, shells.high)
-    return [shells[k] for k in np.flatnonzero(depths > MOST_M).tolist()]
+    return [s for s in body.shells if _box_depth(s.low, s.high, other.low, other.high) > MOST_M]
 
 
 def _depth_of_shells(a: Shell, b: Shell, solids: Solids) -> float:

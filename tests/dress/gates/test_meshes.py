@@ -7,7 +7,7 @@ import pytest
 
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.house import Item
-from pbrs_farm.dress.gates.bodies import Body, Shells
+from pbrs_farm.dress.gates.bodies import Body, shells_of
 from pbrs_farm.dress.gates.penetration import penetration_m
 from pbrs_farm.dress.gates.plumb import Plumb
 from pbrs_farm.dress.gates.shells import Solids, depths_inside, thickness
@@ -118,12 +118,12 @@ def test_the_thickness_of_a_bent_skin_is_not_that_of_its_hull():
 
 def test_connected_parts_are_shells_and_open_ones_are_reported():
     corners = np.concatenate([open_box([0, 0, 0], [1, 1, 1]), open_box([2, 0, 0], [3, 1, 1], 2)])
-    shells = Shells(corners)
+    shells = shells_of(corners)
     assert sorted(s.is_closed for s in shells) == [False, True]
 
 
 def test_a_closed_shell_that_is_inside_out_is_turned():
-    (shell,) = Shells(open_box([0, 0, 0], [1, 1, 1])[:, ::-1])
+    (shell,) = shells_of(open_box([0, 0, 0], [1, 1, 1])[:, ::-1])
     assert shell.is_closed
     assert depth(solid("a", [0.4] * 3, [0.6] * 3), solid("b", [0, 0, 0], [1, 1, 1])) > 0.1
 
@@ -145,5 +145,5 @@ def test_upright_lines_hit_faces_above_and_below_and_their_edges():
 
 def test_a_vase_turned_on_a_lathe_is_closed():
     vase = lathe("", np.array([[0, 0], [0.1, 0], [0.1, 0.3], [0, 0.3]]), np.zeros(3), 0)
-    (shell,) = Shells(np.asarray(vase.positions[vase.faces], np.float64))
+    (shell,) = shells_of(np.asarray(vase.positions[vase.faces], np.float64))
     assert shell.is_closed
