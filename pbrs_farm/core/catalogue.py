@@ -116,7 +116,8 @@ class Catalogue:
         """
         if not licences:
             return self
-        of_entries = sorted({e.licence for e in (*self.pieces, *self.pictures) if e.licence})
+        of_all = {e.licence for e in self.pieces} | {e.licence for e in self.pictures}
+        of_entries = sorted(of_all - {""})
         known = {word for name in of_entries for word in (name, name.partition(" ")[0])}
         for name in licences:
             if known and name not in known:

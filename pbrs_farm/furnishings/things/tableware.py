@@ -72,7 +72,8 @@ def plate_of(m: Maker, outline: Callable[..., Outline], foot: tuple[float, ...],
     """A plate from the outline of its foot to that of its rim, 4 mm thick there."""
     # Widths are between 0.1 and 1 m; corners are smaller, and numbers of ribs larger.
     inner = tuple(v - 0.004 if 0.1 < v < 1 else v for v in rim)
-    m.loft(rings(outline, [(*foot, 0), (*rim, 0.018), (*inner, 0.02), (*foot, 0.005)], **alike),
+    m.loft(rings(outline, [(*foot, 0), (*rim, 0.018), (*inner, 0.02), (*foot, 0.005)],
+        column="", **alike),
         sharp=70.0 if outline is fluted else 50.0)
 
 
