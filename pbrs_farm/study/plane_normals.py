@@ -139,7 +139,7 @@ def large_planes(depth_m: NDArray[Any], normal: NDArray[Any], valid: Mask, K: F6
         unit = plane / np.linalg.norm(plane, axis=0)
         w = inverse[at][:, None]
         is_near = np.abs(rays[at] @ plane - w) <= _MOST_DISTANCE * w
-        return is_near & (-(normal[at] @ unit) >= _LEAST_COSINE)
+        return np.asarray(is_near & (-(normal[at] @ unit) >= _LEAST_COSINE), bool)
 
     for _ in range(_MOST_PLANES):
         free = np.nonzero(is_free)
@@ -151,14 +151,15 @@ def large_planes(depth_m: NDArray[Any], normal: NDArray[Any], valid: Mask, K: F6
         if not candidates.size:
             break
         counts = near(candidates, points).sum(0)
-        plane = candidates[:, [int(counts.argmax())]]
+        plane: F64 = candidates[:, [int(counts.argmax())]]
         for _refinement in range(3):
             pixels = tuple(axis[near(plane, free)[:, 0]] for axis in free)
             if len(pixels[0]) < 3:
                 break
             # Least squares of relative errors.
             weights = 1 / inverse[pixels][:, None]
-            plane = np.linalg.lstsq(rays[pixels] * weights, np.ones_like(weights), rcond=None)[0]
+            fit = np.linalg.lstsq(rays[pixels] * weights, np.ones_like(weights), rcond=None)
+            plane = np.asarray(fit[0], np.float64)
         pixels = tuple(axis[near(plane, free)[:, 0]] for axis in free)
         if len(pixels[0]) < _LEAST_SHARE * valid.size:
             break

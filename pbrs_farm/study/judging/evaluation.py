@@ -74,7 +74,7 @@ class JudgedViews:
         if "plane" not in self.truths[0]:
             return ()
         return tuple(
-            truth | {"normal": truth["plane"], "valid": truth["plane"].any(-1)}
+            truth | {"normal": truth["plane"], "valid": np.asarray(truth["plane"].any(-1))}
             for truth in self.truths
         )
 
