@@ -10,6 +10,7 @@ from collections.abc import Sequence
 from typing import Final
 
 import numpy as np
+from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F64, I32, I64, Bools
 from pbrs_farm.core.house import Surface
@@ -20,6 +21,14 @@ from pbrs_farm.geometry.outlines import Outline, Profile, Triple, oval, rect
 HALF_TURN: Final[F64] = np.diag([-1.0, 1.0, -1.0])  # about the vertical
 
 _SHARP_RAD: Final = np.radians(50)  # where a surface turns by more it has an edge
+
+
+def _surface(
+    name: str, points: F64, faces: NDArray[np.integer], normals: NDArray[np.floating]
+) -> Surface:
+    """A surface of the first material, in single precision."""
+    floats = points.astype(np.float32), normals.astype(np.float32)
+    return Surface(name, floats[0], faces.astype(np.int32), 0, None, floats[1])
 
 
 def slab(low: Sequence[float], high: Sequence[float]) -> Surface:
@@ -46,9 +55,7 @@ def bevelled(low: Sequence[float], high: Sequence[float], r: float = 0.003) -> S
     inner = half - cut
     # Vertex (axis, side, i, j) belongs to the face of that axis and side.
     points = _BEVEL_SIGNS * np.where(_BEVEL_IS_OUT, half, inner) + (a + b) / 2
-    return Surface(
-        "bevelled", points.astype(np.float32), _BEVEL_FACES.copy(), 0, None, _BEVEL_NORMALS.copy()
-    )
+    return _surface("bevelled", points, _BEVEL_FACES, _BEVEL_NORMALS)
 
 
 def _bevel_mesh() -> tuple[F64, Bools, I32]:
@@ -102,7 +109,7 @@ def rounded(low: Sequence[float], high: Sequence[float], r: float, *, n: int = 2
     quads = (np.arange(m - 1)[:, None] * m + np.arange(m - 1)).ravel()
     points: list[F64] = []
     normals: list[F64] = []
-    faces: list[F64] = []
+    faces: list[NDArray[np.integer]] = []
     for axis in range(3):
         u, v = (axis + 1) % 3, (axis + 2) % 3
         for side in (-1.0, 1.0):
@@ -117,14 +124,8 @@ def rounded(low: Sequence[float], high: Sequence[float], r: float, *, n: int = 2
             grid = np.stack([quads, quads + m, quads + m + 1, quads + 1], -1) + first
             triangles = np.concatenate([grid[:, [0, 1, 2]], grid[:, [0, 2, 3]]])
             faces.append(triangles if side > 0 else triangles[:, ::-1])
-    return Surface(
-        "rounded",
-        np.concatenate(points).astype(np.float32),
-        np.concatenate(faces).astype(np.int32),
-        0,
-        None,
-        np.concatenate(normals).astype(np.float32),
-    )
+    corners, directions = np.concatenate(points), np.concatenate(normals)
+    return _surface("rounded", corners, np.concatenate(faces), directions)
 
 
 def revolve(profile: Profile | F64, *, n: int = 16) -> Surface:
@@ -323,7 +324,7 @@ def square_tube(a: Triple, b: Triple, w: float, d: float) -> Surface:
     bar = bevelled((-w / 2, -d / 2, 0.0), (w / 2, d / 2, length), 0.002)
     normals = np.asarray(bar.normals, np.float64) @ matrix.T
     points = bar.positions.astype(np.float64) @ matrix.T + start
-    return Surface("bar", points.astype(np.float32), bar.faces, 0, None, normals.astype(np.float32))
+    return _surface("bar", points, bar.faces, normals)
 
 
 def stretched(surface: Surface, size: tuple[float, float, float]) -> Surface:
@@ -331,8 +332,8 @@ def stretched(surface: Surface, size: tuple[float, float, float]) -> Surface:
     scale = np.asarray(size)
     # Normals scale by the inverse, so that they stay at right angles to the surface.
     normals = unit_vectors(np.asarray(surface.normals, np.float64) / scale)
-    points = (surface.positions.astype(np.float64) * scale).astype(np.float32)
-    return Surface(surface.name, points, surface.faces, 0, None, normals.astype(np.float32))
+    points = surface.positions.astype(np.float64) * scale
+    return _surface(surface.name, points, surface.faces, normals)
 
 
 def sheared(surface: Surface, foot: tuple[float, ...], top: tuple[float, ...]) -> Surface:
@@ -350,13 +351,10 @@ def smooth(name: str, points: F64, faces: I32) -> Surface:
     normals = np.zeros_like(points)
     for k in range(3):
         np.add.at(normals, faces[:, k], n)
-    normals = unit_vectors(normals)
-    return Surface(
-        name, points.astype(np.float32), faces.astype(np.int32), 0, None, normals.astype(np.float32)
-    )
+    return _surface(name, points, faces, unit_vectors(normals))
 
 
-def creased(name: str, points: F64, faces: I32, sharp_rad: float) -> Surface:
+def creased(name: str, points: F64, faces: NDArray[np.integer], sharp_rad: float) -> Surface:
     """A surface whose normals are means of faces that turn by less than sharp_rad, by area."""
     faces = np.asarray(faces, np.int64)
     corners = points[faces]
@@ -383,11 +381,4 @@ def creased(name: str, points: F64, faces: I32, sharp_rad: float) -> Surface:
     for column in np.rint(normals * 1e4).astype(np.int64).T:
         key = (key << 15) + (column + (1 << 14))
     _, first, number = np.unique(key, return_index=True, return_inverse=True)
-    return Surface(
-        name,
-        points[vertex[first]].astype(np.float32),
-        number.reshape(-1, 3).astype(np.int32),
-        0,
-        None,
-        normals[first].astype(np.float32),
-    )
+    return _surface(name, points[vertex[first]], number.reshape(-1, 3), normals[first])

@@ -7,10 +7,10 @@ Effects: reads the example homes' package from the cache (or through apt) and th
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Final, TypeAlias
+from typing import TYPE_CHECKING, Final, TypeAlias, TypeVar
 
 from pydantic import TypeAdapter
 
@@ -36,6 +36,7 @@ _GROUPS_OF_PLUGINS: Final = frozenset({"read", "dress", "repair"})  # fields tha
 
 Licences: TypeAlias = "tuple[str, ...]"
 Finish: TypeAlias = "Callable[[SourceRef, Recipe], FinishedHouse]"
+_Home = TypeVar("_Home", MadeHome, PluginHome)
 
 
 @dataclass(frozen=True, slots=True, kw_only=True)
@@ -99,8 +100,7 @@ def _read_example(source: SourceRef, fields: ReadFields, _licences: Licences) ->
     return read_example(source.location, fields)
 
 
-def _made_home(word: str) -> MadeHome:
-    homes = made_homes(word)
+def _only(word: str, homes: Sequence[_Home]) -> _Home:
     if len(homes) != 1:
         raise BadHouse(word, "", f"names {len(homes)} homes", hint="name one at a time here")
     return homes[0]
@@ -110,7 +110,7 @@ def _made_source(word: str, _files: SourceFiles) -> SourceRef:
     """The source of a generated home; its companion is the furniture package."""
     from pbrs_farm.assets import furniture_package
 
-    home = _made_home(word)
+    home = _only(word, made_homes(word))
     # Ask for the furniture before the run begins, if the home has any.
     companions, package = "", furniture_package.cached() if home.furniture else None
     if home.furniture and package is None:
@@ -133,7 +133,7 @@ def _read_made(source: SourceRef, fields: ReadFields, licences: Licences) -> Hou
     from pbrs_farm.generate.generated_home import generate_home
     from pbrs_farm.prepare.generated_house import house_of_contents
 
-    home = _made_home(source.location)
+    home = _only(source.location, made_homes(source.location))
     # An empty home needs no package, so it also works where packages cannot be read.
     catalogue = catalogue_of_words("", licences) if home.furniture else EMPTY
     contents = generate_home(home, catalogue).contents
@@ -143,16 +143,9 @@ def _read_made(source: SourceRef, fields: ReadFields, licences: Licences) -> Hou
     return replace(house, id=home_id(source), source=its_source)
 
 
-def _plugin_home(word: str) -> PluginHome:
-    homes = plugin_homes(word)
-    if len(homes) != 1:
-        raise BadHouse(word, "", f"names {len(homes)} homes", hint="name one at a time here")
-    return homes[0]
-
-
 def _plugin_source(word: str, _files: SourceFiles) -> SourceRef:
     """The source of a home that a plugin makes; its package and version are part of it."""
-    home = _plugin_home(word)
+    home = _only(word, plugin_homes(word))
     sha = keys.digest(*marks_in_digest("homes", [home.name]), home.word)
     house_id = keys.house_id(f"{home.name}-{home.seed}", sha)
     return SourceRef(kind="plugin", location=home.word, house_id=house_id, sha256=sha)
@@ -162,7 +155,7 @@ def _finish_plugin(source: SourceRef, recipe: Recipe, finish: Finish) -> Finishe
     """The finished Home of a plugin's seed, under the source's id; BadInput for fields of the run in it."""
     if source.dress_seed:
         raise BadInput(source.location, "--dress", "plugins dress their homes themselves")
-    home = _plugin_home(source.location).make()
+    home = _only(source.location, plugin_homes(source.location)).make()
     groups = {path.partition(".")[0] for path, _value in home.settings}
     if foreign := groups - _GROUPS_OF_PLUGINS:
         text = f"sets recipe fields of {', '.join(sorted(foreign))}, which are set by the run"
@@ -217,7 +210,7 @@ HOME_KINDS: Final = (
     HomeKind(
         name="made", source=_made_source, read=_read_made, is_word=is_made,
         words=lambda word: [home.word for home in made_homes(word)], is_of_package=True,
-        has_furniture=lambda source: _made_home(source.location).furniture,
+        has_furniture=lambda source: _only(source.location, made_homes(source.location)).furniture,
     ),
     HomeKind(
         name="plugin", source=_plugin_source, finish=_finish_plugin, is_word=is_plugin,
