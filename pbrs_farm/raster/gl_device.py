@@ -59,10 +59,10 @@ def texture_from_pixels(
     step = -(-max(pixels.shape[:2]) // _MAX_TEXTURE_PX)
     thinned = pixels[::step, ::step]
     rgba = np.full((*thinned.shape[:2], 4), 255, np.uint8)
-    rgba[..., : thinned.shape[2]] = thinned
     # Upload bottom row first, as OpenGL counts v.
+    rgba[..., : thinned.shape[2]] = thinned[::-1]
     size = (rgba.shape[1], rgba.shape[0])
-    texture = context.texture(size, 4, rgba[::-1].tobytes(), internal_format=_SRGB8_ALPHA8)
+    texture = context.texture(size, 4, rgba, internal_format=_SRGB8_ALPHA8)
     texture.build_mipmaps()
     texture.filter = (moderngl.LINEAR_MIPMAP_LINEAR, moderngl.LINEAR)
     texture.repeat_x, texture.repeat_y = repeats

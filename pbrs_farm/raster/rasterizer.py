@@ -84,8 +84,9 @@ class Rasterizer:
     def _upload(self, house: House, n_lights: int) -> None:
         gl, alignment = self._context, self._context.info["GL_UNIFORM_BUFFER_OFFSET_ALIGNMENT"]
         # Upload the mesh; OpenGL takes no empty buffer.
-        self._vertices = gl.buffer(self._mesh.vertices.tobytes() or bytes(32))
-        self._indices = gl.buffer(self._mesh.indices.tobytes() or bytes(12))
+        vertices, indices = self._mesh.vertices, self._mesh.indices
+        self._vertices = gl.buffer(vertices if vertices.size else bytes(32))
+        self._indices = gl.buffer(indices if indices.size else bytes(12))
         # Upload the uniform blocks, one row a material and one an item.
         material_rows = aligned_rows(material_blocks(house), alignment)
         light_rows = aligned_rows(light_blocks(house, n_lights), alignment)

@@ -86,6 +86,10 @@ class CachedHouse:
 
         return Caster.of_house(self.house, self.geometry)
 
+    def forget_caster(self) -> None:
+        """Free the caster's trees; the next use builds those that it needs."""
+        self.__dict__.pop("caster", None)
+
     @cached_property
     def moving(self) -> MovingHouse:
         """The house split into static and moving parts."""

@@ -92,6 +92,8 @@ def _cameras(work: Work) -> StepOutput:
     if keys.is_object(work.house_id):
         return _object_cameras(work, house, seed)
     sampling = chosen_cameras(house, work.recipe, seed, cached.caster)
+    # Labels need other trees than the search: 80 MB.
+    cached.forget_caster()
     views, report = sampling.views, sampling.report
     output = _camera_output(views, report.model_dump(mode="json"), work.recipe)
     return (

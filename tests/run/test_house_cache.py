@@ -54,6 +54,14 @@ def view_work(work: Work, view: str) -> Work:
     )
 
 
+def test_the_trees_of_the_camera_search_are_freed_after_it(work: Work) -> None:
+    run_step("cameras", work)
+    digest = run_step("house", work).marker.digest
+    house = work.house_cache.get(work.store, work.recipe, work.house_id, digest)
+    assert "geometry" in vars(house)
+    assert "caster" not in vars(house)
+
+
 def test_cameras_json_is_read_once_a_house_and_process(work: Work) -> None:
     views = [row[0] for row in run_step("cameras", work).marker.facts["views"]][:3]
     assert len(views) == 3
