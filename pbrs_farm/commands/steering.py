@@ -163,7 +163,8 @@ def _limit(args: argparse.Namespace) -> None:
 
 
 def _gc(args: argparse.Namespace) -> None:
-    from workers.client.garbage import garbage, jobs_in, keep_from_text, remove
+    from workers.client.garbage import garbage, keep_from_text, remove
+    from workers.coordinator.recover import jobs_in
 
     farm, keep_s = farm_of(args), keep_from_text(args.keep)
     # An output folder of `run` has no jobs, and needs no Redis.

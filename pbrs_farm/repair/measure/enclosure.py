@@ -72,7 +72,8 @@ def spaces_of_rooms(
         if why:
             reasons[i] = "; ".join(why)
     # Connect the rooms by their links.
-    labels = connected_nodes(*np.array(links, int).reshape(-1, 2).T, len(rooms))
+    from_room, to_room = np.array(links, int).reshape(-1, 2).T
+    labels = connected_nodes(from_room, to_room, len(rooms))
     members = [np.flatnonzero(labels == k).tolist() for k in dict.fromkeys(labels.tolist())]
     return tuple(
         Space(
