@@ -40,5 +40,13 @@ def test_the_citation_has_the_version_of_the_changelogs_newest_heading() -> None
     assert {"cff-version", "message", "title", "authors"} <= citation.keys()  # required by CFF 1.2
 
 
-def test_notice_credits_wordnet() -> None:
-    assert "Princeton University" in (ROOT / "NOTICE").read_text()
+def test_notice_credits_wordnet_and_the_photographs_of_the_repository() -> None:
+    notice = (ROOT / "NOTICE").read_text()
+    assert "Princeton University" in notice
+    folder = "benchmarks/study/desk"
+    licence = "https://creativecommons.org/licenses/by/4.0/"
+    for text in (notice, (ROOT / folder / "README.md").read_text()):
+        assert "J. Sturm, N. Engelhard, F. Endres, W. Burgard, D. Cremers" in text
+        assert licence in text
+    assert f"`{folder}`" in (ROOT / "docs/licences.md").read_text(encoding="utf-8")
+    assert f"prune {folder}\n" in (ROOT / "MANIFEST.in").read_text()
