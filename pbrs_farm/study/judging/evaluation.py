@@ -18,6 +18,7 @@ import pbrs_farm
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_nearest
+from pbrs_farm.progress import seconds_text
 from pbrs_farm.study.judging.figure_text import (
     PLANES,
     is_underfit,
@@ -43,7 +44,9 @@ from pbrs_farm.study.training_plan import TrainingPlan, plan_of
 
 _HED_ROW = "HED untouched"
 FLOOR: Final = "floor of the truth"
-"""Row of the truth judged as a prediction: smoothed, and on large planes as measured."""
+"""Row of the smoothed truth judged as a prediction."""
+FLOOR_BY_PLANES: Final = "floor by planes"
+"""Row of the second estimate of the floor: the truth judged by large planes."""
 LARGE_PLANES: Final = ", large planes"
 """End of the names of rows judged by the normals of large planes."""
 _LEAST_GROUPS = 3  # minimum number of homes for an interval
@@ -109,7 +112,7 @@ class Evaluation:
     """Figures of predictions for a set of test views."""
 
     views: JudgedViews
-    rows: dict[str, Judged]  # "network", the baseline's name, HED untouched, FLOOR
+    rows: dict[str, Judged]  # "network", the baseline's name, HED untouched, FLOOR, FLOOR_BY_PLANES
     parts: dict[str, ErrorParts] = field(default_factory=dict)  # of normals, by the names of rows
     mirror: bool = False  # the network's predictions are means with those of mirrored pictures
 
@@ -136,6 +139,10 @@ class Evaluation:
         n = self.rows[name].figures.get("n_pixels") if name in self.rows else None
         return None if n is None else n / sum(height * width for height, width in self.views.sizes)
 
+    def shares_of(self, name: str) -> dict[str, float]:
+        """Share of the pixels that a row counts in each part of normals; {} for other tasks."""
+        return self.parts[name].shares() if name in self.parts else {}
+
     def as_json(self) -> dict[str, Any]:
         """Figures, each group's mean error, and each view's own."""
         return {
@@ -148,7 +155,8 @@ class Evaluation:
             "figures": {name: judged.figures for name, judged in self.rows.items()},
             "over_rooms": {name: self.over_rooms(name) for name in self.rows},
             "parts": {name: parts.means_deg() for name, parts in self.parts.items()},
-            "shares": next(iter(self.parts.values())).shares() if self.parts else {},
+            "shares": self.shares_of("network"),
+            "plane_shares": self.shares_of("network" + LARGE_PLANES),
             "groups": self.groups,
             "errors": dict(zip(self.views.ids, self.rows["network"].errors, strict=True)),
         }
@@ -224,7 +232,7 @@ def evaluate(run: Trained, views: JudgedViews, *, mirror: bool = False) -> Evalu
         smooth = (smoothed_normals(truth["normal"], truth["valid"]) for truth in views.truths)
         evaluation = _judged_by(run, evaluation, smooth, {FLOOR: views.truths})
         measured = (truth["normal"] for truth in views.truths)
-        evaluation = _judged_by(run, evaluation, measured, {FLOOR + LARGE_PLANES: planes})
+        evaluation = _judged_by(run, evaluation, measured, {FLOOR_BY_PLANES: planes})
     return evaluation
 
 
@@ -329,18 +337,25 @@ def parts_tables(evaluations: Iterable[dict[str, Any]]) -> str:
     """Tables of the mean angle by kind of surface, depth and luma of rows of JSON; "" for other tasks."""
     tables = []
     for row in evaluations:
-        means = row["parts"]
-        rows = [
-            [
-                part,
-                f"{100 * row['shares'][part]:.1f} %",
-                *(shown_figure("mean_deg", column.get(part)) for column in means.values()),
+        for end, shares in (("", row["shares"]), (LARGE_PLANES, row.get("plane_shares", {}))):
+            # By large planes, other pixels count.
+            means = {
+                name.removesuffix(LARGE_PLANES): column
+                for name, column in row["parts"].items()
+                if name.endswith(LARGE_PLANES) == bool(end) and name != FLOOR_BY_PLANES
+            }
+            rows = [
+                [
+                    part,
+                    f"{100 * shares[part]:.1f} %",
+                    *(shown_figure("mean_deg", column.get(part)) for column in means.values()),
+                ]
+                for part in PARTS
+                if any(part in column for column in means.values())
             ]
-            for part in PARTS
-            if any(part in column for column in means.values())
-        ]
-        if rows:
-            tables.append(markdown([f"{row['on']}: mean, degrees", "pixels", *means], rows))
+            if rows:
+                head = f"{row['on']}{end}: mean, degrees"
+                tables.append(markdown([head, "pixels", *means], rows))
     return "\n\n".join(tables)
 
 
@@ -364,7 +379,7 @@ def notes(run: Trained, evaluations: list[Evaluation]) -> list[str]:
             f" baseline's, {constant:.3g}; rank nothing by it"
         )
     if took := run.record.get("seconds"):
-        lines.append(f"trained in {took / 60:.0f} minutes on {run.record['machine']}")
+        lines.append(f"trained in {seconds_text(took)} on {run.record['machine']}")
     if seconds := run.record.get("seconds_a_step"):
         fastest = min(seconds, key=lambda name: float(seconds[name]))
         timed = ", ".join(f"{name} {value:.2f} s" for name, value in seconds.items())
@@ -387,8 +402,11 @@ def notes(run: Trained, evaluations: list[Evaluation]) -> list[str]:
         text = "averaged with those of the mirrored pictures; of training and held-out homes they are not"
         lines.append(f"predictions of --on are {text}")
     if any(FLOOR in evaluation.rows for evaluation in evaluations):
-        text = "the truth judged as a prediction, smoothed, and on large planes as measured"
+        text = "the smoothed truth judged as a prediction"
         lines.append(f"{FLOOR}, about a perfect network's error: {text}")
+        text = "the truth judged by large planes, at most 30 degrees from it"
+        lines.append(f"{FLOOR_BY_PLANES}, a second estimate: {text}")
+        lines.append("by large planes a perfect network errs by about 0 degrees")
     if _paper(run):
         lines.append("the paper's numbers are of other pictures, another truth and 568,793 views")
     return lines

@@ -19,6 +19,7 @@ import numpy as np
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.installation import checkout_folder, need
+from pbrs_farm.progress import seconds_text
 from pbrs_farm.study.judging.evaluation import Trained, open_run, parts_tables, trained_columns
 from pbrs_farm.study.judging.figure_text import markdown, shown_figure, title_of
 from pbrs_farm.study.training.checkpoint import read_tensors, write_tensor_file
@@ -34,9 +35,8 @@ _PREDICTS: Final = {
     "boundaries": "the probability of an object boundary at each pixel",
 }
 _MOST_HOMES: Final = 12  # number of homes named on the card
-_LOCAL: Final = re.compile(
-    r"(?<![^\s='\"])/(?:[^/\s'\"]+/)*"
-)  # folders of this machine, in commands
+_LOCAL: Final = re.compile(r"(?<![^\s='\"])/(?:[^/\s'\"]+/)*")
+"""Folders of this machine, in commands."""
 
 
 def weights_folder() -> Path:
@@ -102,7 +102,7 @@ def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[s
     stop = record.get("stop_on", "")
     chosen = f"step {record['step']:,} of {plan.steps:,}"
     machine = f"; {record['machine']}" if "machine" in record else ""
-    machine += f", {record['seconds'] / 60:.0f} minutes" if "seconds" in record else ""
+    machine += f", {seconds_text(record['seconds'])}" if "seconds" in record else ""
     commands = "\n".join(record.get("made_by", ()))
     chosen += f", chosen by the error on {stop.removeprefix('on_')}" if stop else ""
     parts = [
@@ -122,6 +122,11 @@ def model_card(run: Trained, record: Mapping[str, Any], evaluations: list[dict[s
         _figures(run, evaluations),
         *filter(None, [parts_tables(evaluations)]),
         *(f"Truth of {row['on']}: {row['truth']}." for row in evaluations),
+        *(
+            f"Predictions of {row['on']} are averaged with those of the mirrored pictures."
+            for row in evaluations
+            if row.get("mirror")
+        ),
         "## Limits",
         f"A small network at {size}, trained on few pictures: not for measuring or for safety."
         " It was trained on rooms of homes by day and by lamplight, not on other places, people,"

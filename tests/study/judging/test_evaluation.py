@@ -125,8 +125,9 @@ def test_the_table_shows_homes_baseline_and_paper_side_by_side(
     assert set(figures["evaluations"][1]["errors"]) == {"wall"}
     # The photograph's wall is 2 m away and faces the camera; the home's views have depth as well.
     parts = [row["parts"] for row in figures["evaluations"]]
-    names = ("network", "mean normal", "floor of the truth")
-    assert parts[1].keys() == {*names, *(f"{name}, large planes" for name in names)}
+    names = ("network", "mean normal")
+    floors = ("floor of the truth", "floor by planes")
+    assert parts[1].keys() == {*names, *(f"{name}, large planes" for name in names), *floors}
     assert parts[0].keys() == {"network", "mean normal"}, "rendered truth needs no floor"
     assert {"frontal", "2 to 4 m"} <= parts[1]["mean normal"].keys()
     assert not {"up", "nearer than 2 m"} & parts[1]["mean normal"].keys()
@@ -198,7 +199,7 @@ def test_a_perfect_network_errs_by_the_floor_of_the_truth_and_not_by_large_plane
     assert 4 < means["perfect"] < 12
     assert means["floor of the truth"] == pytest.approx(means["perfect"], rel=0.25)
     assert means["perfect, large planes"] < 0.5
-    assert means["floor of the truth, large planes"] == pytest.approx(means["perfect"], rel=0.15)
+    assert means["floor by planes"] == pytest.approx(means["perfect"], rel=0.15)
     assert row["parts"]["perfect, large planes"].keys() >= {"up", "oblique", "2 to 4 m"}
     # A fifth of the width has no depth; the crop's sides are cut.
     measured = np.mean([truth["valid"].mean() for truth in views.truths])
@@ -209,7 +210,20 @@ def test_a_perfect_network_errs_by_the_floor_of_the_truth_and_not_by_large_plane
     assert row["over_rooms"]["half"] == pytest.approx((np.mean(errors[:2]) + errors[2]) / 2)
     assert row["groups"].keys() == {"a", "b"}
     text = evaluation_text(trained, [evaluation])
-    assert "large planes: mean, degrees" in text
+    by_title = {
+        cells[1].strip(): [cell.strip() for cell in cells[2:-1]]
+        for cells in (line.split("|") for line in text.splitlines())
+        if len(cells) > 2
+    }
+    columns = by_title[""]
+    floor_columns = [columns.index(name) for name in ("floor of the truth", "floor by planes")]
+    assert all(by_title["mean, degrees"][k] != "-" for k in floor_columns)
+    assert all(by_title["large planes: mean, degrees"][k] == "-" for k in floor_columns)
+    # The kinds of surface by large planes are in a second table with other shares of pixels.
+    on_planes = text.partition(f"{views.name}, large planes: mean, degrees")[2]
+    up = next(line for line in on_planes.splitlines() if line.startswith("| up "))
+    assert up.split("|")[2].strip() == f"{100 * row['plane_shares']['up']:.1f} %"
+    assert row["plane_shares"]["up"] != row["shares"]["up"]
     assert f"{100 * measured:.0f} % of the pixels measured" in text
     assert "averaged with those of the mirrored pictures" in text
 

@@ -16,6 +16,7 @@ from pbrs_farm.cli import main
 from pbrs_farm.core.classes import NYU13_NAMES
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.images import array_from_png, png_from_array
+from pbrs_farm.progress import seconds_text
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.study.judging import evaluation
 from pbrs_farm.study.judging.evaluation import open_run
@@ -174,8 +175,12 @@ def test_a_card_has_the_errors_by_kind_of_surface_and_the_command_of_the_evaluat
     assert f"pbrs-farm evaluate copy --on wall={tmp_path.name} --no-mirror\n```" in card
     assert "| frontal " in card
     assert str(tmp_path) not in card
+    assert "mirrored pictures" not in card
+    assert main(["evaluate", str(copy), "--on", f"wall={tmp_path}", "--mirror"]) == 0
+    mirrored = (pack_weights(copy, tmp_path / "mirrored").root / "README.md").read_text()
+    assert "Predictions of wall are averaged with those of the mirrored pictures." in mirrored
     report = json.loads((copy / "evaluation/evaluation.json").read_text())
-    assert not report["evaluations"][0]["mirror"]
+    assert report["evaluations"][0]["mirror"]
     assert report["run"]["seconds"] > 0
 
 
@@ -208,7 +213,8 @@ def test_packed_weights_predict_like_the_run_and_are_checked_by_their_sha256(
     card = (packed.root / "README.md").read_text()
     assert half.record["weights_sha256"] in card
     assert "degrees" in card
-    made_by = f"{os.cpu_count()} cores, 0 minutes.\n\nMade by:\n\n```\npbrs-farm run home\n"
+    seconds = seconds_text(whole.record["seconds"])
+    made_by = f"{os.cpu_count()} cores, {seconds}.\n\nMade by:\n\n```\npbrs-farm run home\n"
     assert f"{made_by}pbrs-farm train normals root --out run --hold-out none --set" in card
     assert f"pbrs_farm {pbrs_farm.__version__}, torch {torch.__version__}" in card
     assert str(run.parent) not in card + (packed.root / "run.json").read_text()
