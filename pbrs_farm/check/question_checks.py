@@ -23,6 +23,7 @@ from pbrs_farm.check.cases import FormCase
 from pbrs_farm.check.checks import Check
 from pbrs_farm.check.plan import is_within, polygon_area
 from pbrs_farm.check.stored_files import object_from_json, stored_bytes
+from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.check.stored_mesh import Triangles, triangles_from_glb
 from pbrs_farm.images import array_from_png
 
@@ -296,10 +297,9 @@ def _fault_of_lamps(scene: _Scene, about: list[int], truth: str) -> str:
     if sorted(scene.namesakes(about[0])) != sorted(about) or len(about) != 2:
         return "the lamps are not two"
     left, right = sorted(about, key=lambda k: int(sum(scene.rows[k]["box2d"][::2])))
-    lit = [
-        k for k in (left, right)
-        if any(light["power"] > 0 for light in scene.house["items"][k - 1]["lights"])
-    ]  # fmt: skip
+    house = StoredHouse(scene.folder, scene.house)
+    powered = {house.lamps[name][0] for name in house.lamps if house.light(name)["power"] > 0}
+    lit = [k for k in (left, right) if k in powered]
     return "" if lit == [{"left": left, "right": right}[truth]] else f"the lit lamps are {lit}"
 
 

@@ -70,18 +70,18 @@ class StoredHouse:
     @cached_property
     def lamps(self) -> dict[str, tuple[int, int]]:
         """Name of each lit lamp (its item's id, `/n` behind it if it has several) -> instance and number."""
-        lights = {
-            f"{row['id']}/{k}" if len(row["lights"]) > 1 else row["id"]: (instance, k)
-            for instance, row in sorted(self.items.items())
-            for k in range(len(row["lights"]))
-        }
-        share = self.recipe.get("emission", {}).get("lamps_on", 1.0)
         home, seed = re.sub(r"-e[0-9a-f]{8}$", "", self.id), self.recipe.get("seed", 0)
         return {
-            name: place
-            for name, place in lights.items()
-            if keys.seed("lamp on", name, home, seed) < share * 2**32
+            f"{row['id']}/{k}" if len(row["lights"]) > 1 else row["id"]: (instance, k)
+            for instance, row in sorted(self.items.items())
+            if keys.seed("lamp on", row["id"], home, seed) < self.lamps_on * 2**32
+            for k in range(len(row["lights"]))
         }
+
+    @property
+    def lamps_on(self) -> float:
+        """Share of the lamps that the recipe has on."""
+        return float(self.recipe.get("emission", {}).get("lamps_on", 1.0))
 
     def light(self, name: str) -> dict[str, Any]:
         """The row of a light of `lamps`."""

@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import re
 from collections.abc import Sequence
-from typing import Annotated, Final, Literal
+from typing import TYPE_CHECKING, Annotated, Final, Literal
 
 import numpy as np
 from pydantic import Field
@@ -16,6 +16,9 @@ from pydantic import Field
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import Matrix4
 from pbrs_farm.core.record import Record
+
+if TYPE_CHECKING:
+    from pbrs_farm.core.recipe import Recipe
 
 Row = tuple[float, float, float, float]
 Rows = tuple[Row, Row, Row, Row]
@@ -201,6 +204,12 @@ def edited_id(house_id: str, edits: Sequence[Edit]) -> str:
 def unedited_id(house_id: str) -> str:
     """The id of a house without its edits, whose sky an edited house keeps."""
     return re.sub(rf"{SUFFIX}[0-9a-f]{{8}}$", "", house_id)
+
+
+def is_lamp_on(item_id: str, house_id: str, recipe: Recipe) -> bool:
+    """True if the recipe has a lamp on, with all its light sources; edits of a home keep the draw."""
+    draw = keys.seed("lamp on", item_id, unedited_id(house_id), recipe.seed) / 2**32
+    return draw < recipe.emission.lamps_on
 
 
 def rows_of_matrix(matrix: Matrix4) -> Rows:

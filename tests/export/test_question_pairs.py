@@ -2,6 +2,7 @@
 
 import json
 from dataclasses import replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -14,9 +15,10 @@ from pbrs_farm.core.frames import rotation_y
 from pbrs_farm.core.house import LightPart
 from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.core.lighting import PowerUnit
+from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.export.export_views import export
 from pbrs_farm.export.questions.asking import Question
-from pbrs_farm.export.questions.clips import Clip, Thing
+from pbrs_farm.export.questions.clips import Clip, Thing, lamps_off
 from pbrs_farm.export.questions.kinds import KINDS
 from pbrs_farm.export.questions.pairs import HIDDEN, pair_questions
 from tests.inputs.asked_clips import clip_of, drafts, house_of, visible_item
@@ -103,6 +105,46 @@ def test_which_of_two_lamps_is_on_is_not_a_matter_of_brightness() -> None:
     assert asked("pair_lamp", left, picture("three", *lamps(0, 800, 0))) == []
     # Daylight and a headlight do not show lamps.
     vars(right.views[0].entry)["file"] = {"opengl_dl.png": "opengl_dl.png"}.get
+    assert asked("pair_lamp", left, right) == []
+
+
+def test_a_lamp_that_the_recipe_has_off_is_lit_for_neither_question_nor_check(
+    tmp_path: Path,
+) -> None:
+    half = recipe_from_name("fast", {"emission.lamps_on": "0.5"})
+    (tmp_path / "recipe.json").write_text(half.model_dump_json())
+    pictures: dict[str, Clip] = {}
+    for home in (f"home-{k}" for k in range(40)):
+        clip = picture(f"{home}__v", *lamps(800, 800))
+        house = replace(clip.house, id=home)
+        off = lamps_off(tmp_path / "recipe.json", house)
+        if len(off) == 1:
+            pictures[min(off)] = replace(clip, house=house, lamps_off=off)
+    left, right = pictures["lamp 2"], pictures["lamp 1"]
+    questions = asked("pair_lamp", left, right)
+    check_pairs(questions)
+    assert {(q.clip, q.answer) for q in questions} == {(left.name, "left"), (right.name, "right")}
+    # The check draws the same from the files.
+    for clip in (left, right):
+        view = tmp_path / "houses" / clip.house.id / "views" / "v"
+        view.mkdir(parents=True)
+        items = [{"instance": n, "id": f"lamp {n}", "lights": [{"power": 800}]} for n in (1, 2)]
+        (view.parents[1] / "house.json").write_text(json.dumps({"items": items}))
+        rows = [
+            {"class": "lamp", "name": "lamp", "item": f"lamp {row['id']}", "fraction": 0.1} | row
+            for row in clip.views[0].facts["instances"]
+            if row["id"] < 3
+        ]
+        (view / "view.json").write_text(json.dumps(clip.views[0].facts | {"instances": rows}))
+    lines = [json.dumps(q.row(k) | q.facts()) for k, q in enumerate(questions)]
+    (tmp_path / "questions.jsonl").write_text("\n".join(lines))
+    assert wrong_answers(tmp_path, tmp_path) == []
+    (tmp_path / "recipe.json").write_text(recipe_from_name("fast").model_dump_json())
+    assert [line.partition(": ")[2][:18] for line in wrong_answers(tmp_path, tmp_path)] == [
+        "the lit lamps are "
+    ] * 2
+    # opengl_il shows all lamps.
+    vars(right.views[0].entry)["file"] = {"opengl_il.png": "opengl_il.png"}.get
     assert asked("pair_lamp", left, right) == []
 
 

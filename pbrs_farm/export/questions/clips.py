@@ -6,8 +6,8 @@ Effects: reads the house of a view and, on demand, its layers.
 from __future__ import annotations
 
 from collections import Counter, defaultdict
-from collections.abc import Iterable, Iterator, Sequence
-from dataclasses import dataclass, field
+from collections.abc import Container, Iterable, Iterator, Sequence
+from dataclasses import dataclass, field, replace
 from functools import cache, cached_property
 from itertools import groupby
 from pathlib import Path
@@ -18,14 +18,18 @@ import shapely
 import trimesh
 from scipy.spatial import cKDTree
 
+from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64
+from pbrs_farm.core.edits import is_lamp_on
 from pbrs_farm.core.house import House, Item, Room
+from pbrs_farm.core.recipe import recipe_from_json
 from pbrs_farm.core.record import read_csv
 from pbrs_farm.export.chosen_view import ChosenView
 from pbrs_farm.export.export_homes import stored_house
 from pbrs_farm.export.nouns import is_plural, noun_of
 from pbrs_farm.export.sequences import frames_by_house
 from pbrs_farm.geometry.surface_points import item_triangles, surface_points
+from pbrs_farm.regular_files import read_given
 
 LEAST_FRACTION: Final = 0.003
 """Minimum share of a picture's pixels of a visible item."""
@@ -114,6 +118,8 @@ class Clip:
     things: Sequence[Thing]  # all noticeable items, by instance
     gaps: dict[tuple[int, int], float] = field(default_factory=dict, repr=False)
     """Gaps of two instances, metres; all clips of a house have the same."""
+
+    lamps_off: Container[str] = ()  # items with light sources that the recipe has off
 
     _ways: dict[tuple[int, int], bool] = field(default_factory=dict, init=False, repr=False)
 
@@ -291,14 +297,26 @@ def clips_of(views: Sequence[ChosenView]) -> Iterator[Clip]:
         firsts = [frame.first for frame in frames]
         if house_id.startswith("object_"):
             continue
-        house = stored_house(firsts[0].entry.folder.parent.parent)
+        folder = firsts[0].entry.folder.parents[1]
+        house = stored_house(folder)
+        off = lamps_off(folder.parents[1] / keys.RECIPE, house)
         gaps: dict[tuple[int, int], float] = {}
         walk = [view for view in firsts if view.facts.get("frame") is not None]
         if len(walk) > 1:
-            yield clip_of_views(house_id, walk, house, gaps)
+            yield replace(clip_of_views(house_id, walk, house, gaps), lamps_off=off)
         for view in firsts:
             if len(walk) < 2 or view.facts.get("frame") is None:
-                yield clip_of_views(f"{house_id}__{view.id}", [view], house, gaps)
+                clip = clip_of_views(f"{house_id}__{view.id}", [view], house, gaps)
+                yield replace(clip, lamps_off=off)
+
+
+def lamps_off(file: Path, house: House) -> frozenset[str]:
+    """Ids of a house's lamps that the recipe in a file has off; none without the file. BadRecipe if it is damaged."""
+    if not file.is_file():
+        return frozenset()
+    recipe = recipe_from_json(read_given(file), str(file))
+    lamps = (item.id for item in house.items if item.lights)
+    return frozenset(lamp for lamp in lamps if not is_lamp_on(lamp, house.id, recipe))
 
 
 def clip_of_views(

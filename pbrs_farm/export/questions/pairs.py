@@ -300,7 +300,13 @@ def _lit_side(clip: Clip, lamps: Sequence[Thing]) -> str:
         return ""
     boxes = {row["id"]: row["box2d"] for row in view.facts["instances"]}
     a, b = ((boxes[t.instance][0] + boxes[t.instance][2]) / 2 for t in lamps)
-    is_on = [any(light.power > 0 for light in t.item.lights) for t in lamps]
+    has_power = [any(light.power > 0 for light in t.item.lights) for t in lamps]
+    is_on = [
+        power and t.item.id not in clip.lamps_off for power, t in zip(has_power, lamps, strict=True)
+    ]
+    # opengl_il shows the lamps that the recipe has off, too.
+    if view.picture == Mode.OPENGL_IL and is_on != has_power:
+        return ""
     if abs(a - b) < _APART * view.facts["width_px"] or sum(is_on) != 1:
         return ""
     return "left" if is_on[0] == (a < b) else "right"

@@ -10,7 +10,7 @@ import numpy as np
 
 from pbrs_farm.core import keys
 from pbrs_farm.core.arrays import F64, I64, Bools, triple
-from pbrs_farm.core.edits import unedited_id
+from pbrs_farm.core.edits import is_lamp_on
 from pbrs_farm.core.frames import LM_PER_W, LUMINANCE
 from pbrs_farm.core.house import Geometry, House, Item, LightPart, MaterialKind
 from pbrs_farm.core.lighting import flux_lm
@@ -55,6 +55,7 @@ def area_emitters_of_house(
     emitters: list[AreaEmitter] = []
     taken: set[int] = set()  # surfaces that an earlier light part emits from
     for index, item in enumerate(house.items):
+        is_on = is_lamp_on(item.id, house.id, recipe)
         for k, part in enumerate(item.lights):
             mine = [number + j for j in part.emitting if number + j not in taken]
             taken.update(mine)
@@ -62,11 +63,11 @@ def area_emitters_of_house(
                 [np.zeros(0, np.int64), *(face_of.get(j, _NO_FACES) for j in mine)]
             )
             name = f"{item.id}/{k}" if len(item.lights) > 1 else item.id
-            if len(faces) and _is_on(name, house.id, recipe):
+            if len(faces) and is_on:
                 flux = _flux_and_rgb(house, part, k, item, recipe)
                 emitters.append(_bulb_emitter(house, geometry, (index, name), faces, flux, recipe))
         # Let shades emit by themselves where the published renderer had them do so.
-        if released:
+        if released and is_on:
             for j, surface in enumerate(item.surfaces):
                 is_shade = house.materials[surface.material].kind is MaterialKind.SHADE
                 if is_shade and number + j in face_of and number + j not in taken:
@@ -75,12 +76,6 @@ def area_emitters_of_house(
                     )
         number += len(item.surfaces)
     return tuple(emitters)
-
-
-def _is_on(name: str, house_id: str, recipe: Recipe) -> bool:
-    """True if a lamp is on: all are, unless the recipe's share is below 1; edits of a home keep the draw."""
-    draw = keys.seed("lamp on", name, unedited_id(house_id), recipe.seed) / 2**32
-    return draw < recipe.emission.lamps_on
 
 
 def _faces_by_surface(geometry: Geometry, keep: Bools) -> dict[int, I64]:
