@@ -34,7 +34,7 @@ def check_illuminance(case: HouseCase) -> None:
         if is_room:
             judge("lit room", place, case.tally, row=row, room=room)
         if "warnings" in row:
-            warnings = _warnings(row, is_day=is_day)
+            warnings = _warnings(row, is_day=is_day, some_lamps_off=house.lamps_on < 1)
             judge("lux warnings", place, case.tally, row=row, warnings=warnings)
         in_marker = house.marker_facts("illuminance").get("floor_lux", {}).get(row["room"])
         if in_marker:
@@ -44,12 +44,12 @@ def check_illuminance(case: HouseCase) -> None:
         _check_sky(case, sky)
 
 
-def _warnings(row: Mapping[str, Any], *, is_day: bool) -> list[str]:
+def _warnings(row: Mapping[str, Any], *, is_day: bool, some_lamps_off: bool) -> list[str]:
     """Warnings about levels out of range: docs/formats/view_json.md."""
     lit, lines = set(row["lit_by"]), []
     has = {
         "outdoor": is_day and bool(lit & {"windows", "sky"}),
-        "indoor": bool(lit & {"lamps", "fallback", "added"}),
+        "indoor": bool(lit & {"lamps", "fallback", "added"}) and not some_lamps_off,
     }
     for group, (low, high) in _EXPECTED_LX.items():
         value = row[f"{group}_lx"]

@@ -333,7 +333,8 @@ def _illuminance(work: Work) -> StepOutput:
     lux = cached.light_scene.floor_lux(cached.house, seed=seed)
     # Give the views of a room its row through the marker's facts.
     is_day = bool(cached.sky.sun_direction[1] >= 0)
-    record = illuminance_record(cached.house, lux, is_day=is_day)
+    some_lamps_off = work.recipe.emission.lamps_on < 1
+    record = illuminance_record(cached.house, lux, is_day=is_day, some_lamps_off=some_lamps_off)
     warnings = {row["room"]: row["warnings"] for row in record["rooms"] if row["warnings"]}
     return StepOutput(
         {"illuminance.json": json_bytes({**record, "sky": cached.sky.facts()})},

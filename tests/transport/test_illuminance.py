@@ -2,11 +2,19 @@
 
 from __future__ import annotations
 
+import json
 import math
 from dataclasses import replace
+from pathlib import Path
+from types import SimpleNamespace
+from typing import Any, cast
 
 import pytest
 
+from pbrs_farm.check.cases import HouseCase
+from pbrs_farm.check.certificate import Tally
+from pbrs_farm.check.sky_checks import check_illuminance
+from pbrs_farm.check.stored_house import StoredHouse
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.raycast.variant import choose_variant
 from pbrs_farm.transport.illuminance import illuminance_record, photometric_warnings
@@ -53,3 +61,26 @@ def test_rooms_outside_the_range_are_named_and_unlit_groups_are_not() -> None:
     record = illuminance_record(house, lux)
     assert [(r["room"], len(r["warnings"])) for r in record["rooms"]] == [("0_0", 1), ("0_1", 1)]
     assert record["rooms"][1]["indoor_lx"] == 2000.0
+
+
+@pytest.mark.parametrize(("lamps_on", "n_warnings"), [(1.0, 1), (0.7, 0)])
+def test_a_room_may_lack_lamp_light_if_the_recipe_has_some_off(
+    lamps_on: float, n_warnings: int, tmp_path: Path
+) -> None:
+    room = replace(rooms.house([], []).rooms[0], lit_by=("windows", "lamps"))
+    house = replace(rooms.house([], []), rooms=(room,))
+    lux = {room.id: {"outdoor": 100.0, "indoor": 0.0}}
+    record = illuminance_record(house, lux, some_lamps_off=lamps_on < 1)
+    assert len(record["rooms"][0]["warnings"]) == n_warnings
+    # The check judges by the recipe of the output root.
+    folder = tmp_path / "houses" / house.id
+    folder.mkdir(parents=True)
+    recipe = recipe_from_name("fast", {"emission.lamps_on": str(lamps_on)})
+    (tmp_path / "recipe.json").write_text(recipe.model_dump_json())
+    (folder / "illuminance.json").write_text(json.dumps(record))
+    row = {"id": room.id, "name": room.name, "lit_by": room.lit_by}
+    (folder / "house.json").write_text(json.dumps({"rooms": [row]}))
+    tally = Tally()
+    case: Any = SimpleNamespace(house=StoredHouse(folder), tally=tally)
+    check_illuminance(cast(HouseCase, case))
+    assert tally.n_failed == 0
