@@ -20,6 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from pbrs_farm.core.errors import BadInput, MachineFailed
+from pbrs_farm.core.picture_cameras import CAMERAS
 from pbrs_farm.operating_system import OWN_SESSION, end_tree, lock_file
 from pbrs_farm.run.relight import picture_of_layers
 from pbrs_farm.sets.stream_cache import CachedView, StreamCache, renderer_lock
@@ -38,7 +39,7 @@ class Stream(Sequence[dict[str, Any]]):
     """The samples of one epoch of a set, rendered on demand; a map-style data set for torch's DataLoader.
 
     A sample is a dict of arrays (H, W, ...) by layer, with K (3, 3), id, house, room, generation of the view,
-    `light` (the options of `pbrs-farm relight` that give the picture) and exposure_ev. The order is shuffled by
+    `light` (the options of `pbrs-farm relight` that give the picture) and exposure_ev (drawn; 0 for a camera whose own exposure errs). The order is shuffled by
     seed and epoch: leave a DataLoader's shuffle off. Equal seeds and epochs give equal bytes for any number of
     workers, after a kill too. Each epoch draws new light, and every `reuse` epochs new views. Raises BadInput if no
     home has a view, MachineFailed if the renderer ends.
@@ -90,12 +91,14 @@ class Stream(Sequence[dict[str, Any]]):
         colour: dict[str, NDArray[Any]] = {}
         if cached.light is not None:
             draw = self.plan.light(self.number, unit, view, cached.light)
-            stops = float(np.clip(cached.tone.exposure_ev + draw.exposure_ev, -8, 8))
+            # A camera that errs has its own draw of the exposure.
+            ev = 0.0 if CAMERAS[cached.tone.camera].spread else draw.exposure_ev
+            stops = float(np.clip(cached.tone.exposure_ev + ev, -8, 8))
             tone = cached.tone.model_copy(update={"exposure_ev": stops})
             colour["colour"] = picture_of_layers(
                 cached.light, tone, outdoor=draw.outdoor, lamps=draw.factors
             )
-            facts |= {"light": str(draw), "exposure_ev": draw.exposure_ev}
+            facts |= {"light": str(draw), "exposure_ev": ev}
         sample = sample_of_stored(cached.facts, labels, replace(self.plan.request, size=None))
         names = {"id": sample.id, "house": sample.house, "room": sample.room, "K": sample.K}
         return names | facts | colour | sample.arrays() | cached.layers

@@ -144,6 +144,19 @@ def test_each_epoch_draws_other_light_and_labels_stay(tmp_path: Path) -> None:
     assert [digest(s) for s in Stream(small, 2, start=1)] == again[1:]
 
 
+def test_the_exposure_of_a_camera_that_errs_is_not_drawn_again(tmp_path: Path) -> None:
+    small = plan(tmp_path, n_homes=1)
+    recipe = recipe_from_name("preview", {"tone.camera": "snapshot"})
+    tones = [recipe.camera_of("home-1", f"0_0_{k}").tone for k in range(3)]
+    views = [replace(view(1.0), tone=tone) for tone in tones]
+    cache = StreamCache(small.folder, small.cache_bytes)
+    cache.put((0, 0), bytes_of_unit(views), lambda _path: 0.0)
+    samples = [sample for epoch in range(4) for sample in Stream(small, epoch)]
+    assert {sample["exposure_ev"] for sample in samples} == {0.0}
+    cache.put((0, 1), bytes_of_unit([view(1.0)] * 3), lambda _path: 0.0)
+    assert len({sample["exposure_ev"] for sample in Stream(small, 4)}) == 3
+
+
 def test_a_home_without_views_is_replaced_and_none_is_an_error(tmp_path: Path) -> None:
     small = plan(tmp_path, n_homes=2, reuse=1)
     cache = StreamCache(small.folder, small.cache_bytes)
