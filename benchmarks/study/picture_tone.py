@@ -28,7 +28,7 @@ from PIL import Image
 import pbrs_farm.cli
 from benchmarks.figures import write_report
 from pbrs_farm.core import keys
-from pbrs_farm.core.arrays import F64, Srgb8Image
+from pbrs_farm.core.arrays import F64, Mask, Srgb8Image
 from pbrs_farm.core.recipe import ToneFields, recipe_from_json
 from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
 from pbrs_farm.formats.radiance_exr import radiance_from_exr
@@ -76,7 +76,7 @@ def main(words: Sequence[str] = ()) -> None:
     if words and words[0] == "--photographs":
         files = sorted(path for folder in words[1:] for path in Path(folder).iterdir())
         photographs = [np.asarray(Image.open(file).convert("RGB")) for file in files]
-        measured = np.array([picture_row(p, np.zeros(p.shape[:2])) for p in photographs])
+        measured = np.array([picture_row(p, np.zeros(p.shape[:2], bool)) for p in photographs])
         print(*(f"{name} {value}" for name, value in figures_of(measured).items()), sep="\n")
         return
     rows, views, neutral = list[F64](), list[Frame](), list[Srgb8Image]()
@@ -123,7 +123,7 @@ def _rendered() -> str:
     return str(OUT / "views")
 
 
-def window_mask(frame: Frame) -> F64:
+def window_mask(frame: Frame) -> Mask:
     """(H, W) True for panes, pixels behind them, and pixels without a surface."""
     glass = (
         frame.layer("glass") > 0 if "glass" in frame.layers else np.zeros(frame.depth.shape, bool)
@@ -131,12 +131,12 @@ def window_mask(frame: Frame) -> F64:
     return np.asarray(glass | (frame.depth == 0))
 
 
-def picture_row(picture: Srgb8Image, is_window: F64) -> F64:
+def picture_row(picture: Srgb8Image, is_window: Mask) -> F64:
     """(9,) mean, sd, p1 and p95 of luma; shares below 20, below 3, above 245, above 245 beside windows; chroma."""
     rgb = picture.astype(np.float64)
     luma = _luma(picture)
     p1, p95 = np.percentile(luma, [1, 95])
-    shares = [(luma < 20), (luma < 3), (luma > 245), (luma > 245) & (is_window == 0)]
+    shares = [(luma < 20), (luma < 3), (luma > 245), (luma > 245) & ~is_window]
     chroma = (rgb.max(axis=-1) - rgb.min(axis=-1)).mean()
     return np.array([luma.mean(), luma.std(), p1, p95, *(s.mean() for s in shares), chroma])
 

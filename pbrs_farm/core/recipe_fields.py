@@ -423,7 +423,8 @@ class ToneFields(FieldGroup):
     key: float = field(0.18, "released: Reinhard's key value", high=1000, above=0)
     white_balance: float = field(0.7, "correction of the light's colour; 0 = none, 1 = white", 0, 1)
     camera: Literal["neutral", "snapshot", "phone", "slr", "webcam", "kinect", "drawn"] = field(
-        "neutral", "photo: camera of the pictures (docs/light.md); drawn: one of these per view"
+        "neutral",
+        "photo: camera of the pictures (docs/light.md); drawn: phone, slr, webcam or kinect per view",
     )
     variants: int = field(0, "more pictures of mlt_il_ol, by random cameras", 0, 8)
     warmth_ev: float = field(0.0, "red over blue after white balance, stops", -4, 4)
