@@ -25,6 +25,7 @@ from pbrs_farm.operating_system import NOT_REGULAR, open_unwaiting
 
 MAX_FILE_BYTES: Final = 512 * 2**20  # maximum size of a file read whole: a home, a scene, a picture
 MAX_SCENE_BYTES: Final = 1_000_000_000  # maximum size of a scene or model with referenced files
+MAX_TOML_BYTES: Final = 2**20  # tomllib is slow
 MAX_TEXT_BYTES: Final = 64 * 2**20  # maximum size of a text file: a list of houses or cameras
 MAX_DIGEST_BYTES: Final = 4 * 2**30  # maximum size of a file read in chunks
 
@@ -68,12 +69,14 @@ def read_given(
         raise error(path, "", fault_of(fault), hint=hint) from None
 
 
-def text_given(path: Path, *, error: type[BadInput] = BadInput) -> str:
+def text_given(
+    path: Path, max_bytes: int = MAX_TEXT_BYTES, *, error: type[BadInput] = BadInput
+) -> str:
     """Read a text file given by the user, like read_given; raises error if it is not UTF-8.
 
     Also raises error if its content is of a known file type that differs from its suffix.
     """
-    data = read_given(path, MAX_TEXT_BYTES, error=error)
+    data = read_given(path, max_bytes, error=error)
     if other_kind(data, path) is not None:
         text, hint = wrong_kind(data, path)
         raise error(path, "", text, hint=hint)
@@ -108,7 +111,7 @@ def _kind_at(path: Path) -> tuple[str, str]:
 
 def toml_given(path: Path) -> dict[str, Any]:
     """Read the tables of a TOML file given by the user, like text_given; raises BadInput if it is no TOML."""
-    text = text_given(path)
+    text = text_given(path, MAX_TOML_BYTES)
     try:
         return tomllib.loads(text)
     # RecursionError: brackets within brackets; ValueError: also an integer of thousands of digits.

@@ -48,6 +48,7 @@ def _word(key: str) -> str:
     return str(key).replace(".", "_")
 
 
+@functools.cache
 def owner_of(file: str, field: str) -> FieldRow | None:
     """The row of a field; None for an unknown field."""
     return row_and_names(file, field, "fields")[0]
@@ -74,7 +75,6 @@ def _pattern(file: str) -> str:
     return re.sub(r"\\{(house|view|key)\\}", r"(?P<\1>[^/]+?)", text)
 
 
-@functools.cache
 def row_and_names(
     file: str, field: str = "", table: str = "set_fields"
 ) -> tuple[FieldRow | None, dict[str, str]]:

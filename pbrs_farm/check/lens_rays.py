@@ -206,7 +206,7 @@ def scaled_k(intrinsics: Mapping[str, Any], width: float, height: float) -> F64:
 
 
 class StoredCamera:
-    """A camera by stored numbers; they may be read when first asked for, and nobody sets them."""
+    """A camera by stored numbers, which are read-only and may be read on first use."""
 
     k: F64  # (3, 3) K
     world_from_camera: F64  # (4, 4) pose with OpenCV axes (x right, y down, z forward)

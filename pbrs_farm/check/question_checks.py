@@ -47,7 +47,7 @@ _COLOURS: Final = (
 _COLUMNS = ("id", "dataset", "scene_name", "question_type", "question", "ground_truth", "options")
 
 
-@lru_cache(maxsize=256)
+@lru_cache(maxsize=64)
 def _tree_on(corners: bytes) -> cKDTree:
     """A search tree of points on triangles, none farther than _SPACING_M from the next."""
     # By bytes: versions of a home share most of their items.

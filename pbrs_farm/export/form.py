@@ -58,8 +58,8 @@ class Convention:
 class Takes:
     """The views that a form takes; left_out.txt names the others.
 
-    of: those of a list that it takes. left_out: why the others are not exported, "" = they are not named; the user
-    is told of those whose reason begins with "has no". none, hint: the error if it takes none.
+    of: those of a list that it takes. left_out: why the others are not exported, "" = they are not named; the
+    command prints those whose reason begins with "has no". none, hint: the error if it takes none.
     """
 
     of: Callable[[list[ChosenView]], list[ChosenView]]

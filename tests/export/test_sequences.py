@@ -1,6 +1,7 @@
 """A stereo walk in the formats of SLAM, reconstruction and stereo tools."""
 
 import json
+import shutil
 from pathlib import Path
 from typing import Any
 
@@ -155,6 +156,24 @@ def test_kittis_maps_have_its_units_and_noc_leaves_out_hidden_pixels(
     assert (left - right)[0, 3] == pytest.approx(left[0, 0] * 0.065)
     # Its pixel coordinates start at the centre of the first: the middle of 64 x 48 is (31.5, 23.5).
     assert left[:2, 2] == pytest.approx([31.5, 23.5])
+
+
+def test_kitti_leaves_out_views_of_other_lenses_that_no_frame_needs(
+    root: Path, tmp_path: Path
+) -> None:
+    mixed = Path(shutil.copytree(root, tmp_path / "mixed"))
+    first = views_of(mixed)[0]
+    still = next(mixed.glob(f"houses/*/views/{first.id}")).with_name("still")
+    shutil.copytree(still.with_name(first.id), still)
+    for name in ("flow_forward", "disparity"):
+        next(still.glob(f"{name}.*")).unlink()
+    facts = first.facts | {"view": "still", "lens": {"model": "equirect"}}
+    (still / "view.json").write_text(
+        json.dumps({k: v for k, v in facts.items() if k not in ("frame", "time_s")})
+    )
+    export(mixed, tmp_path / "x", "kitti")
+    export(root, tmp_path / "y", "kitti")
+    assert (tmp_path / "x/index.txt").read_text() == (tmp_path / "y/index.txt").read_text()
 
 
 def test_a_walk_has_a_laser_scan_a_frame(root: Path, tmp_path: Path) -> None:

@@ -28,7 +28,7 @@ _MOST_CHANGES: Final = 1000  # maximum lines of the audit
 
 
 class UserTable:
-    """Who may ask for work, on the ledger's Redis; an empty table asks nobody. Methods raise LedgerUnavailable."""
+    """Who may ask for work, on the ledger's Redis; no token is required while the table is empty. Methods raise LedgerUnavailable."""
 
     def __init__(self, ledger: RedisLedger) -> None:
         self._ledger = ledger

@@ -129,8 +129,10 @@ def _tone_of(view_json: bytes, recipe: bytes) -> ToneFields:
 def _tone_facts(tone: ToneFields) -> dict[str, Any]:
     from pbrs_farm.transport.develop.tone_mapping import knee_of
 
-    names = "preset key white_balance exposure_ev contrast flare warmth_ev tint_ev white"
-    return {n: getattr(tone, n) for n in names.split()} | {"knee": knee_of(tone.white)}
+    shown = {
+        "preset", "key", "white_balance", "exposure_ev", "contrast", "flare", "warmth_ev", "tint_ev", "white",
+    }  # fmt: skip
+    return tone.model_dump(include=shown) | {"knee": knee_of(tone.white)}
 
 
 def _view_files(data: bytes) -> tuple[Sequence[bytes], bool]:

@@ -43,7 +43,8 @@ def write_interiorverse(views: list[ChosenView], out: Path, _choice: Choice) -> 
 def _files(view: ChosenView, numbers: dict[str, int]) -> Files:
     scene = view.house.id.replace(_WORD, "-im")
     number = numbers[scene] = numbers.get(scene, -1) + 1
-    millimetres = np.where(view.depth_m > 0, view.depth_m * 1000, np.inf).astype(np.float32)
+    depth_m = view.depth_m
+    millimetres = np.where(depth_m > 0, depth_m * 1000, np.inf).astype(np.float32)
     images: dict[str, Mapping[str, F32]] = {
         "im": rgb_planes(_exposed_light(view)),
         "albedo": rgb_planes(linear_from_srgb(view.array("albedo") / 255).astype(np.float32)),

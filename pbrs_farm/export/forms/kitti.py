@@ -24,17 +24,24 @@ def write_kitti(views: list[ChosenView], out: Path, _choice: Choice) -> None:
     `noc` only those visible in the other picture. index.txt: number, house, view. Files without data are
     omitted; BadInput if no view has flow or disparity.
     """
-    moments = [
-        moment
+    write_files(out, map(_files, count(), _moments(views)))
+
+
+def _moments(views: list[ChosenView]) -> list[tuple[SequenceFrame, SequenceFrame | None]]:
+    """Frames with flow or disparity, each with the next one of its sequence."""
+    return [
+        (frame, following if following and "frame" in following.first.facts else None)
         for frames in frames_by_house(views).values()
-        for moment in zip_longest(frames, frames[1:])
-        if _has_labels(moment[0].first)
+        for frame, following in zip_longest(frames, frames[1:])
+        if frame.first.has("disparity") or frame.first.has("flow_forward")
     ]
-    write_files(out, map(_files, count(), moments))
 
 
-def _has_labels(view: ChosenView) -> bool:
-    return view.has("disparity") or view.has("flow_forward")
+def _pictured(views: list[ChosenView]) -> list[ChosenView]:
+    """The views in the pictures of moments."""
+    frames = [frame for moment in _moments(views) for frame in moment if frame is not None]
+    used = {id(view) for frame in frames for view in (frame.first, frame.right)}
+    return [view for view in views if id(view) in used]
 
 
 def _files(number: int, moment: tuple[SequenceFrame, SequenceFrame | None]) -> Files:
@@ -110,7 +117,7 @@ FORM = ViewForm(
     write_kitti,
     "KITTI 2015: `image_2`, `image_3`, `disp_occ_0`, `disp_noc_0`, `flow_occ`, `flow_noc`, `calib`",
     takes=Takes(
-        lambda views: views if any(map(_has_labels, views)) else [],
+        _pictured,
         "",
         "no view has flow or disparity",
         "run with --stereo 0.065 --layers disparity occlusion_stereo flow_forward",

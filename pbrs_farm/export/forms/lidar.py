@@ -29,9 +29,8 @@ from pbrs_farm.raycast.caster import Caster
 from pbrs_farm.run.house_cache import decoded_textures
 from pbrs_farm.truth.lidar import LIDARS, LidarScan, LidarSensor, lidar_scan
 
-_PCD_NAMES: Final = {
-    f"n{axis}": f"normal_{axis}" for axis in "xyz"
-}  # fields that PCD names otherwise
+# Fields that PCD names otherwise.
+_PCD_NAMES: Final = {f"n{axis}": f"normal_{axis}" for axis in "xyz"}
 
 
 class LidarOptions(Record):

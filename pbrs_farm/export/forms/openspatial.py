@@ -8,7 +8,6 @@ Effects: reads views, writes files.
 
 from __future__ import annotations
 
-from itertools import groupby
 from pathlib import Path
 from typing import Any, Final
 
@@ -47,9 +46,12 @@ def write_openspatial(views: list[ChosenView], out: Path, _choice: Choice) -> No
     rows: list[dict[str, Any]] = []
     write_files(out, (_files(view, rows) for view in views))
     of_views = {name: pa.list_(kind) for name, kind in _OF_VIEW.items()}
-    scenes = [list(group) for _id, group in groupby(rows, lambda row: row["scene_id"])]
+    scenes: dict[str, list[dict[str, Any]]] = {}
+    for row in rows:
+        scenes.setdefault(row["scene_id"], []).append(row)
     together = [
-        scene[0] | {name: [row[name] for row in scene] for name in _OF_VIEW} for scene in scenes
+        scene[0] | {name: [row[name] for row in scene] for name in _OF_VIEW}
+        for scene in scenes.values()
     ]
     tables = {"singleview": (rows, _OF_VIEW), "multiview": (together, of_views)}
     schemas = {

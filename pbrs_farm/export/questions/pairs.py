@@ -73,16 +73,16 @@ def clips_by_home(clips: Iterable[Clip]) -> Iterator[list[Clip]]:
 
 
 def all_questions(
-    clips: Iterable[Clip], tell: Callable[[Clip], None] = lambda _clip: None
+    clips: Iterable[Clip], on_clip: Callable[[Clip], None] = lambda _clip: None
 ) -> list[Question]:
-    """The questions of clips, then the pairs of each home; tell: called with each clip.
+    """The questions of clips, then the pairs of each home; on_clip: called with each clip.
 
     Holds one home at a time.
     """
     asker, questions, pairs = Asker(), list[Question](), list[Question]()
     for of_home in clips_by_home(clips):
         for clip in of_home:
-            tell(clip)
+            on_clip(clip)
         questions += asker.asked(of_home)
         pairs += pair_questions(of_home, len(pairs) // 2)
     return questions + pairs

@@ -47,9 +47,11 @@ def _solids() -> Mapping[tuple[str, str], list[_Solid]]:
 @cache
 def _terms(cell: str) -> tuple[tuple[float, str], ...]:
     """Factor and size of each term of a sum."""
+    terms = _TERM.findall(cell)
+    assert "".join(factor + size for factor, size in terms) == cell, f"forms.csv: {cell}"
     return tuple(
         (float(factor if factor.strip("+-") else factor + "1"), size)
-        for factor, size in _TERM.findall(cell)
+        for factor, size in terms
         if factor or size
     )
 

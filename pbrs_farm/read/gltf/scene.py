@@ -12,7 +12,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from posixpath import dirname
-from typing import Any
+from typing import Any, Final
 
 import numpy as np
 
@@ -35,6 +35,7 @@ from pbrs_farm.read.gltf.node_classes import Mapping, mapping_from_json
 from pbrs_farm.read.gltf.scene_items import items_of_scene
 from pbrs_farm.regular_files import MAX_SCENE_BYTES, read_given
 
+_MOST_SIDE_BYTES: Final = 16 * 2**20
 _SMALL_M, _LARGE_M = 0.3, 150.0  # a scene beyond is in other units than metres
 
 
@@ -50,7 +51,7 @@ class Beside:
     def of(cls, folder: RootFolder, name: str, fetch: Fetch) -> Beside:
         """The mapping and room files beside the file of that name below the folder."""
         sides = (folder.name_from(dirname(name), side) for side in side_files(Path(name)))
-        return cls(fetch, *(folder.read(side, max_bytes=MAX_SCENE_BYTES) for side in sides))
+        return cls(fetch, *(folder.read(side, max_bytes=_MOST_SIDE_BYTES) for side in sides))
 
 
 def read_given_gltf(given: GivenFile, fields: ReadFields) -> House:
