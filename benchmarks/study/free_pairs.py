@@ -1,7 +1,7 @@
 """Photographs with depth that anyone may fetch: a desk of TUM RGB-D, Middlebury's Motorcycle and Aloe.
 
 The desk is in this repository (desk/README.md), the garage in a wheel of scikit-image, the plant in
-Debian's opencv-doc. Three rooms are too few for a statistic; they tell whether a change helps at all.
+Debian's opencv-doc. Three rooms are too few for a statistic; they show large effects of a change only.
 Effects: pip and apt, ~/.cache.
 """
 

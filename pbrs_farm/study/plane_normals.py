@@ -134,19 +134,19 @@ def large_planes(depth_m: NDArray[Any], normal: NDArray[Any], valid: Mask, K: F6
     dice, is_free = np.random.default_rng(0), valid.copy()
     planes = np.zeros((height, width, 3), np.float32)
 
-    def near(plane: F64, at: _Pixels) -> Mask:
+    def near(plane: F64, pixels: _Pixels) -> Mask:
         """The pixels on planes (3, ...) a x + b y + c = 1/z, (pixels, ...)."""
         unit = plane / np.linalg.norm(plane, axis=0)
-        w = inverse[at][:, None]
-        is_near = np.abs(rays[at] @ plane - w) <= _MOST_DISTANCE * w
-        return np.asarray(is_near & (-(normal[at] @ unit) >= _LEAST_COSINE), bool)
+        w = inverse[pixels][:, None]
+        is_near = np.abs(rays[pixels] @ plane - w) <= _MOST_DISTANCE * w
+        return np.asarray(is_near & (-(normal[pixels] @ unit) >= _LEAST_COSINE), bool)
 
     for _ in range(_MOST_PLANES):
         free = np.nonzero(is_free)
         if len(free[0]) < _LEAST_SHARE * valid.size:
             break
-        some = dice.integers(0, len(free[0]), _N_POINTS)
-        points = tuple(axis[some] for axis in free)
+        indices = dice.integers(0, len(free[0]), _N_POINTS)
+        points = tuple(axis[indices] for axis in free)
         candidates = _planes_of_triples(points, is_free, rays, inverse, dice)
         if not candidates.size:
             break
