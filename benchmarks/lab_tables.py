@@ -99,6 +99,11 @@ def written_tables(docs: Path, reports: Path) -> list[str]:
     """
     messages: list[str] = []
     sources: dict[str, set[str]] = {}
+    books = {
+        name: page.relative_to(docs).as_posix()
+        for page in sorted((docs / "lab").glob("*.md"))
+        for name, _ in _BLOCK.findall(page.read_text(encoding="utf-8"))
+    }
     for page in sorted(docs.rglob("*.md")):
         text = page.read_text(encoding="utf-8")
 
@@ -106,7 +111,10 @@ def written_tables(docs: Path, reports: Path) -> list[str]:
             name = block[1]
             if name not in TABLES:
                 raise ValueError(f"{page}: no table {name!r}; of {', '.join(TABLES)}")
-            lines, problem = table_lines(TABLES[name], reports, in_lab=page.parent.name == "lab")
+            # The bench's own table in the lab book has commit and machine.
+            book = books.get(TABLES[name].benches[0], "lab/index.md")
+            book = "" if page.parent.name == "lab" else book
+            lines, problem = table_lines(TABLES[name], reports, book)
             if problem:
                 messages.append(f"{page}: {name} is unchanged: {problem} ({TABLES[name].command})")
                 return block[0]
@@ -125,8 +133,8 @@ def written_tables(docs: Path, reports: Path) -> list[str]:
     return messages
 
 
-def table_lines(table: Table, reports: Path, *, in_lab: bool) -> tuple[list[str], str]:
-    """(lines of a table and of its source, ""), or ([], reason)."""
+def table_lines(table: Table, reports: Path, book: str = "") -> tuple[list[str], str]:
+    """(lines of a table and of its source, ""), or ([], reason). book: page to link instead of the source."""
     figures: dict[str, Any] = {}
     sources_of_table: dict[str, list[str]] = {}
     for bench in table.benches:
@@ -146,8 +154,8 @@ def table_lines(table: Table, reports: Path, *, in_lab: bool) -> tuple[list[str]
         return [], f"{', '.join(table.benches)}: no figure {error.args[0]}"
     except (TypeError, ValueError) as error:
         return [], f"{', '.join(table.benches)}: a figure that does not fit its row: {error}"
-    if not in_lab:
-        where = "commit and machine: the [lab book](lab/light.md)"
+    if book:
+        where = f"commit and machine: the [lab book]({book})"
         return [*lines, "", f"*`{table.command}`; {where}.*"], ""
     source = "; ".join(
         f"{where}, load {', '.join(loads)}" for where, loads in sources_of_table.items()

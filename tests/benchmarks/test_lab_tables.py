@@ -71,6 +71,19 @@ def test_a_table_is_written_with_command_commit_machine_and_load(
     assert page.read_text() == text
 
 
+def test_a_table_outside_the_lab_book_links_the_page_of_its_bench(
+    page: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setitem(lab_tables.TABLES, "one", lab_tables.TABLES["ours"])
+    page.with_name("other.md").write_text("<!-- bench:one -->\n<!-- /bench -->\n")
+    outside = page.parent.with_name("guide.md")
+    outside.write_text("<!-- bench:ours -->\n<!-- /bench -->\n")
+    _report(tmp_path, "one", {"one.s": 6.84})
+    _report(tmp_path, "two", {"two.same": 1})
+    written_tables(tmp_path / "docs", tmp_path)
+    assert "commit and machine: the [lab book](lab/other.md)" in outside.read_text()
+
+
 def test_tables_of_two_commits_are_reported(page: Path, tmp_path: Path) -> None:
     _report(tmp_path, "one", {"one.s": 6.84})
     _report(tmp_path, "two", {"two.same": 1}, "0123456789ab")
