@@ -238,7 +238,12 @@ def _is_mirrored(args: argparse.Namespace, run: Trained) -> bool:
 
 
 def _check_judged(args: argparse.Namespace) -> None:
-    """Raises BadInput unless `evaluate` names one network and, for shipped weights, an output folder."""
+    """Raises BadInput unless `evaluate` names one network and, for shipped weights, an output folder.
+
+    --mirror without --on is refused, since stored figures are not computed again.
+    """
+    if args.mirror is not None and not args.on:
+        raise BadInput("--mirror", "", "needs --on", hint="--on NAME=PLACE")
     if (args.run is None) == (args.task is None):
         text, hint = "give either a RUN or --task", "pbrs-farm evaluate RUN, or --task normals"
         raise BadInput("evaluate", str(args.run or ""), text, hint=hint)

@@ -254,8 +254,8 @@ class NyuMat:
             raise BadInput(path, "", self._open_fault(str(error))) from None
         try:
             self._images, self._depths = self._tables(h5py)
-            has_raw = raw and "rawDepths" in self._file
-            self._stored = self._file["rawDepths"] if has_raw else self._depths
+            self.is_raw = raw and "rawDepths" in self._file
+            self._stored = self._file["rawDepths"] if self.is_raw else self._depths
         except BadInput:
             self._file.close()
             raise

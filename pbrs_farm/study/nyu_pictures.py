@@ -1,6 +1,6 @@
 """NYUv2's nyu_depth_v2_labeled.mat: pictures with normals, classes, boundaries. Effects: reads files.
 
-Pictures are cropped as in Eigen et al. Normals are planes fitted to the raw depth; classes need
+Pictures are cropped as in Eigen et al. Normals are planes fitted to rawDepths, or to depths without it; classes need
 classMapping40.mat beside the file (894 names to 40, Gupta et al. 2013), and
 splits.mat lists the training (795) and test pictures (654).
 """
@@ -23,6 +23,7 @@ from pbrs_farm.study.photographs import (
     cropped_frame,
     moved_origin,
     photo_truth,
+    truth_text,
 )
 from pbrs_farm.study.tasks.classes_task import classes_of
 from pbrs_farm.study.tasks.study_task import Arrays
@@ -32,7 +33,7 @@ from pbrs_farm.truth.boundary import instance_boundary
 # Intrinsics of the colour camera in the data set's toolbox.
 _K: Final = np.array([[518.85790, 0, 325.58245], [0, 519.46961, 253.73617], [0, 0, 1]], np.float64)
 _CROP: Final = (slice(44, 471), slice(40, 601))  # rows and columns of Eigen et al.
-NYU_TRUTHS: Final = {
+_TRUTHS: Final = {
     "normals": PLANE_TRUTH,
     "depth": DEPTH_TRUTH,
     "segmentation": "classes by classMapping40.mat, where labelled",
@@ -56,6 +57,12 @@ def nyu_pictures(path: Path, plan: TrainingPlan, split: str) -> Iterator[RealFra
             yield cropped_frame(photo.id, photo.rgb[_CROP], crops, K, plan, room=room)
     if is_empty:
         raise BadInput(path, "", f"no {split} picture: splits.mat is of another file")
+
+
+def truth_of_nyu(path: Path, task_name: str) -> str:
+    """Description of the truth of a task; BadInput for another file."""
+    with NyuMat(path, raw=True) as mat:
+        return truth_text(_TRUTHS[task_name], ["raw" if mat.is_raw else "filled"])
 
 
 def has_splits(path: Path) -> bool:

@@ -19,15 +19,25 @@ from pbrs_farm.study.training.training_views import CAMERA, ViewArrays, camera_n
 from pbrs_farm.study.training_plan import TrainingPlan
 
 PLANE_TRUTH: Final = (
-    "planes fitted to raw depth in windows of 1/40 of the width; mask: at least 60 % of the window on"
+    "planes fitted to {depth} depth in windows of 1/40 of the width; mask: at least 60 % of the window on"
     " one surface, within 1 % of its depth, not seen edge-on"
 )
-DEPTH_TRUTH: Final = "the photograph's own depth along the axis, where it has one"
+DEPTH_TRUTH: Final = "the photograph's own {depth} depth along the axis, where it has one"
 PHOTO_TRUTHS: Final = {
     "normals": PLANE_TRUTH,
     "depth": DEPTH_TRUTH,
     "segmentation": "NYU40 classes of the picture's own label, where labelled",
 }
+
+
+def truth_text(truth: str, depths: Iterable[str]) -> str:
+    """Description of a truth for photographs with "raw" depth, or "filled" depth without holes.
+
+    Example:
+        >>> truth_text("planes fitted to {depth} depth", ["filled", "raw", "raw"])
+        'planes fitted to raw and filled depth'
+    """
+    return truth.format(depth=" and ".join(sorted(set(depths), reverse=True)))
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -2,7 +2,8 @@
 
 A folder has pairs in a layout of docs/selection.md and the camera: intrinsics.json with fx, fy, cx,
 cy in pixels (depth_scale: units per metre), or intrinsics.txt with those four numbers or the nine of
-K, beside the pictures or in a folder above. Normals are planes fitted to raw depth.
+K, beside the pictures or in a folder above. rooms.json joins folders or pictures of one room.
+Normals are planes fitted to depth.
 
 ScanNet: <scene>/{color,depth,label}/NAME and the 4 x 4 matrix of the depth camera as written by its
 tools; depth in mm, labels in NYU40 ids. SUN RGB-D: <scene>/{image,depth,depth_bfx}, intrinsics.txt,
@@ -15,8 +16,8 @@ from __future__ import annotations
 
 import json
 import re
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
-from functools import lru_cache
 from pathlib import Path
 from typing import Final
 
@@ -26,6 +27,7 @@ from numpy.typing import NDArray
 from pbrs_farm.core.arrays import F64
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.resampling import resized_nearest
+from pbrs_farm.core.shown_text import did_you_mean
 from pbrs_farm.curate import tum_frames
 from pbrs_farm.curate.photographs import Photo, PhotoFiles, is_same_form, pairs_in, photo_from_pair
 from pbrs_farm.images import array_from_png
@@ -67,6 +69,7 @@ class PhotoCamera:
 def real_pairs(folder: Path, plan: TrainingPlan) -> tuple[PhotoFiles, ...]:
     """Pairs with truth of the plan's task (classes: ScanNet's labels, SUN RGB-D's toolbox); BadInput."""
     pairs = pairs_in(folder, raw=True)
+    _check_rooms(folder, pairs)
     if plan.task == "segmentation":
         pairs = tuple(pair for pair in pairs if has_labels_of(pair))
     if plan.task not in ("normals", "depth", "segmentation") or not pairs:
@@ -94,15 +97,15 @@ def room_of(pair: PhotoFiles, folder: Path) -> str:
     """Room of a pair: by rooms.json, else its folder; scans of a ScanNet scene and frames of a SUN RGB-D video are one."""
     rooms = _rooms_of(folder)
     place = pair.id.rpartition("/")[0]
-    if known := [rooms[name] for name in (pair.id, place) if name in rooms]:
-        return known[0]
+    for name in (pair.id, place):
+        if name in rooms:
+            return rooms[name]
     if _is_of_sun_rgbd(pair):
         # A folder has one picture; those of a video differ by the frame's number, Sun3D's by their folder.
         return place if "sun3ddata" in place.split("/") else _FRAME.sub("", pair.id)
     return _SCAN.sub(r"\1", place)
 
 
-@lru_cache(maxsize=4)
 def _rooms_of(folder: Path) -> dict[str, str]:
     """Content of rooms.json: room by picture or folder; BadInput for another form."""
     path = folder / "rooms.json"
@@ -116,6 +119,21 @@ def _rooms_of(folder: Path) -> dict[str, str]:
         hint = '{"kitchen_morning": "kitchen", "kitchen_evening": "kitchen"}'
         raise BadInput(path, "", "expected the room of each folder", hint=hint)
     return rows
+
+
+def _check_rooms(folder: Path, pairs: Sequence[PhotoFiles]) -> None:
+    """Raise BadInput for a name in rooms.json without pictures."""
+    names = {name for pair in pairs for name in (pair.id, pair.id.rpartition("/")[0])}
+    for name in _rooms_of(folder):
+        if name not in names:
+            text, hint = "no folder of pictures and no picture", did_you_mean(name, names)
+            raise BadInput(folder / "rooms.json", name, text, hint=hint)
+
+
+def depths_of_pairs(pairs: Iterable[PhotoFiles]) -> list[str]:
+    """Kinds of depth among pairs: "raw", or "filled" for SUN RGB-D's depth_bfx."""
+    folders = {pair.depth.parent.name for pair in pairs}
+    return sorted({"filled" if name == "depth_bfx" else "raw" for name in folders})
 
 
 def digest_of_picture(pair: PhotoFiles) -> str:

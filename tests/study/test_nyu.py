@@ -59,6 +59,8 @@ def test_pictures_are_cut_to_the_crop_and_the_test_split(task: str, mat: Path) -
 
 
 def test_raw_depth_judges_and_parts_of_a_scene_are_one_room(mat: Path) -> None:
+    filled = open_judged_place(str(mat), small_plan("depth"), mode="mlt_il_ol")
+    assert "filled depth along the axis" in filled.truth
     with h5py.File(mat, "a") as file:
         raw = np.full((3, 640, 480), 2.5, np.float32)
         raw[:, 300:320] = 0
@@ -69,6 +71,7 @@ def test_raw_depth_judges_and_parts_of_a_scene_are_one_room(mat: Path) -> None:
         table = file.create_dataset("scenes", (1, 3), h5py.ref_dtype)
         table[0] = [row.ref for row in refs]
     views = open_judged_place(str(mat), small_plan("depth"), mode="mlt_il_ol")
+    assert "raw depth along the axis" in views.truth
     assert views.rooms == ("kitchen_0004", "kitchen_0004")
     depth = views.truths[0]["depth"]
     assert (depth == 0).mean() == pytest.approx(20 / depth.shape[1])

@@ -12,9 +12,9 @@ from torch import nn
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house_split import home_of
 from pbrs_farm.study.judging.evaluation import JudgedViews, judged_of_arrays
-from pbrs_farm.study.nyu_pictures import NYU_HOME, NYU_TRUTHS, has_splits, nyu_pictures
-from pbrs_farm.study.photographs import PHOTO_TRUTHS, RealFrame, with_large_planes
-from pbrs_farm.study.real_frames import read_frame, real_pairs
+from pbrs_farm.study.nyu_pictures import NYU_HOME, has_splits, nyu_pictures, truth_of_nyu
+from pbrs_farm.study.photographs import PHOTO_TRUTHS, RealFrame, truth_text, with_large_planes
+from pbrs_farm.study.real_frames import depths_of_pairs, read_frame, real_pairs
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.prediction import predict, score_predictions
 from pbrs_farm.study.training.training_job import CURVE_THRESHOLDS
@@ -146,12 +146,14 @@ def _photographs(
     folder: Path, plan: TrainingPlan, name: str, trained_on: frozenset[str]
 ) -> JudgedViews:
     """All pairs below a folder; BadInput for one that trained, by its digest."""
-    frames = [read_frame(pair, folder, plan) for pair in real_pairs(folder, plan)]
+    pairs = real_pairs(folder, plan)
+    frames = [read_frame(pair, folder, plan) for pair in pairs]
     for frame in frames:
         if frame.digest in trained_on:
             text = "this photograph was used for training"
             raise BadInput(folder, frame.id, text, hint="photographs of other rooms")
-    return _judged_frames(name, PHOTO_TRUTHS[plan.task], frames)
+    truth = truth_text(PHOTO_TRUTHS[plan.task], depths_of_pairs(pairs))
+    return _judged_frames(name, truth, frames)
 
 
 def _nyu_views(
@@ -164,7 +166,7 @@ def _nyu_views(
         raise BadInput(path, "", text, hint="put splits.mat beside it")
     frames = list(nyu_pictures(path, plan, split))
     which = f"{len(frames)} test pictures" if split == "test" else "all pictures, no splits.mat"
-    return _judged_frames(name, f"{NYU_TRUTHS[plan.task]}; Eigen's crop; {which}", frames)
+    return _judged_frames(name, f"{truth_of_nyu(path, plan.task)}; Eigen's crop; {which}", frames)
 
 
 def _judged_frames(name: str, truth: str, frames: Sequence[RealFrame]) -> JudgedViews:

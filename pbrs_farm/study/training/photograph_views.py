@@ -10,8 +10,8 @@ from typing import Any, Final
 
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.curate.photographs import PhotoFiles
-from pbrs_farm.study.photographs import PHOTO_TRUTHS, arrays_of_frames
-from pbrs_farm.study.real_frames import digest_of_picture, read_frame, real_pairs
+from pbrs_farm.study.photographs import PHOTO_TRUTHS, arrays_of_frames, truth_text
+from pbrs_farm.study.real_frames import depths_of_pairs, digest_of_picture, read_frame, real_pairs
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.training_views import ViewArrays, evenly_spaced
 from pbrs_farm.study.training_plan import TrainingPlan
@@ -46,7 +46,8 @@ class Photographs:
     def record(self) -> dict[str, Any]:
         """Entry in the record of a run; digests identify the pictures in any folder."""
         digests = [digest_of_picture(pair) for pair in self.pairs]
-        return {"name": self.folder.resolve().name, "pictures": digests}
+        name, depths = self.folder.resolve().name, depths_of_pairs(self.pairs)
+        return {"name": name, "pictures": digests, "depths": depths}
 
 
 def mix_of(word: str) -> Mix:
@@ -75,7 +76,9 @@ def facts_of(rows: Sequence[Mapping[str, Any]], plan: TrainingPlan) -> dict[str,
     """Fields of a run's record about its photographs and their truth; none without photographs."""
     if not rows:
         return {}
-    truth = f"{task_of(plan.task).truth}; of photographs: {PHOTO_TRUTHS[plan.task]}"
+    depths = [depth for row in rows for depth in row["depths"]]
+    of_photographs = truth_text(PHOTO_TRUTHS[plan.task], depths)
+    truth = f"{task_of(plan.task).truth}; of photographs: {of_photographs}"
     return {"photographs": list(rows), "truth": truth}
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+import shutil
 from pathlib import Path
 
 import h5py
@@ -249,10 +250,19 @@ def test_scans_and_videos_of_a_room_are_one(
     assert room_of(PhotoFiles(id, picture, picture), tmp_path) == room
 
 
-def test_a_damaged_list_of_rooms_is_named(pairs: Path) -> None:
+def test_a_damaged_or_misspelt_list_of_rooms_is_named(pairs: Path) -> None:
     (pairs / "rooms.json").write_text('["kitchen"]')
     with pytest.raises(BadInput, match=r"rooms\.json: expected the room of each folder"):
         open_judged_place(str(pairs), small_plan(), mode="mlt_il_ol")
+    # The file is read again after a correction. Pictures have rooms, too.
+    (pairs / "rooms.json").write_text('{"wal": "kitchen"}')
+    with pytest.raises(
+        BadInput, match=r"rooms\.json: wal: no folder of pictures.*did you mean wall"
+    ):
+        open_judged_place(str(pairs), small_plan(), mode="mlt_il_ol")
+    (pairs / "rooms.json").write_text('{"wall": "kitchen"}')
+    views = open_judged_place(str(pairs), small_plan(), mode="mlt_il_ol")
+    assert views.rooms == ("kitchen",)
 
 
 def test_photographs_are_judged_at_full_size(pairs: Path) -> None:
@@ -367,6 +377,12 @@ def test_sun_rgbds_depth_has_its_bits_turned_back(tmp_path: Path) -> None:
     views = open_judged_place(str(tmp_path), small_plan("depth"), mode="mlt_il_ol")
     assert [float(t["depth"].max()) for t in views.truths] == pytest.approx([2.0, 2.1])
     assert all((t["depth"] == 0).sum() == 60 for t in views.truths), "raw depth judges"
+    assert views.truth.startswith("the photograph's own raw depth")
+    for scene in ("kv1/NYUdata/NYU0001", "xtion/sun3ddata/x"):
+        shutil.rmtree(tmp_path / "SUNRGBD" / scene / "depth")
+        views = open_judged_place(str(tmp_path), small_plan("depth"), mode="mlt_il_ol")
+        depths = "filled" if scene.startswith("xtion") else "raw and filled"
+        assert views.truth.startswith(f"the photograph's own {depths} depth")
 
 
 def write_sun_scene(scene: Path) -> None:
@@ -622,6 +638,8 @@ def test_weights_of_the_package_are_judged_by_their_task(
     assert judged["figures"]["network"]["n_pixels"] > 0
     assert main(words[:-3]) == 1
     assert "needs --out" in capsys.readouterr().err
+    assert main(["evaluate", "--task", "normals", "--mirror"]) == 1
+    assert "--mirror: needs --on" in capsys.readouterr().err
     assert main(["evaluate", "--on", str(pairs)]) == 1
     assert main(["evaluate", str(out), "--task", "normals"]) == 1
     assert capsys.readouterr().err.count("give either a RUN or --task") == 2
