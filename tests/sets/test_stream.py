@@ -32,8 +32,9 @@ from pbrs_farm.run.relight import LampFactor, RelightLayers, relit
 from pbrs_farm.sets import stream_renderer
 from pbrs_farm.sets.stream import Stream
 from pbrs_farm.sets.stream_cache import CachedView, StreamCache, bytes_of_unit
+from pbrs_farm.sets.stream_farm import fetched_views, planned_rows
 from pbrs_farm.sets.stream_plan import StreamHome, StreamPlan, drawn_light
-from pbrs_farm.sets.stream_renderer import StreamRenderer, fetched_views, planned_rows
+from pbrs_farm.sets.stream_renderer import StreamRenderer
 from pbrs_farm.store.folder import FolderStore
 from pbrs_farm.transport.develop.mode_pictures import LinearAovs
 from pbrs_farm.views.stored_layers import ViewFacts

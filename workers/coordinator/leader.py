@@ -23,9 +23,11 @@ from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.store import store_from_url
 from workers.config import FarmConfig, config_from_environment, make_scratch
 from workers.coordinator.dispatcher import Dispatcher, NotLeading, Send, celery_sender
+from workers.coordinator.farm_alerts import FarmAlerts
+from workers.coordinator.preemption import choose_victims
 from workers.coordinator.progress_rates import Rates
-from workers.coordinator.turns import choose_victims, find_blocked_jobs
-from workers.coordinator.webhook import FarmAlerts, Webhook, poster, watch_jobs
+from workers.coordinator.turns import find_blocked_jobs
+from workers.coordinator.webhook import Webhook, poster, watch_jobs
 from workers.ledger.redis_ledger import RedisLedger
 from workers.ledger.task_ledger import JobView, LedgerUnavailable, User
 from workers.ledger.user_table import UserTable

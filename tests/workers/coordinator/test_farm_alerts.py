@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import Any
 
 from tests.run.fake_child import FakeClock
-from workers.coordinator.webhook import FarmAlerts
+from workers.coordinator.farm_alerts import FarmAlerts
 from workers.ledger.task_ledger import JobView, WorkerView
 
 JOB = "0" * 12

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import pytest
 
-from workers.coordinator.turns import choose_victims
+from workers.coordinator.preemption import choose_victims
 from workers.ledger.task_ledger import Hold, JobView, WorkerView
 
 
