@@ -30,7 +30,7 @@ from pbrs_farm.transport.kernels.path_state import (
 from pbrs_farm.transport.kernels.path_step import advance
 from pbrs_farm.transport.kernels.sampler import SobolSampler, device_array, stream_key
 
-LAMPS_LX: Final = (30.0, 1000.0)  # expected mean illuminance of a floor by lamps (docs/light.md)
+LAMPS_LX: Final = (30.0, 1000.0)  # expected mean by lamps (docs/formats/view_json.md)
 DAYLIGHT_LX: Final = (20.0, 5000.0)  # and by daylight; a value outside is a warning
 
 DARK_LX: Final = 1.0  # a room with less by all light is dark: full moonlight is 0.3 lx
