@@ -216,8 +216,8 @@ def test_a_perfect_network_errs_by_the_floor_of_the_truth_and_not_by_large_plane
         for cells in (line.split("|") for line in text.splitlines())
         if len(cells) > 2
     }
-    columns = by_title[""]
-    floor_columns = [columns.index(name) for name in ("floor of the truth", "floor by planes")]
+    titles = by_title[""]
+    floor_columns = [titles.index(name) for name in ("floor of the truth", "floor by planes")]
     assert all(by_title["mean, degrees"][k] != "-" for k in floor_columns)
     assert all(by_title["large planes: mean, degrees"][k] == "-" for k in floor_columns)
     # The kinds of surface by large planes are in a second table with other shares of pixels.
@@ -378,10 +378,10 @@ def test_sun_rgbds_depth_has_its_bits_turned_back(tmp_path: Path) -> None:
     assert [float(t["depth"].max()) for t in views.truths] == pytest.approx([2.0, 2.1])
     assert all((t["depth"] == 0).sum() == 60 for t in views.truths), "raw depth judges"
     assert views.truth.startswith("the photograph's own raw depth")
-    for scene in ("kv1/NYUdata/NYU0001", "xtion/sun3ddata/x"):
-        shutil.rmtree(tmp_path / "SUNRGBD" / scene / "depth")
+    for folder in ("kv1/NYUdata/NYU0001", "xtion/sun3ddata/x"):
+        shutil.rmtree(tmp_path / "SUNRGBD" / folder / "depth")
         views = open_judged_place(str(tmp_path), small_plan("depth"), mode="mlt_il_ol")
-        depths = "filled" if scene.startswith("xtion") else "raw and filled"
+        depths = "filled" if folder.startswith("xtion") else "raw and filled"
         assert views.truth.startswith(f"the photograph's own {depths} depth")
 
 
