@@ -351,7 +351,9 @@ def _covered(*folders: Path) -> float:
     env = os.environ | {"COVERAGE_FILE": total}
     coverage = [sys.executable, "-m", "coverage"]
     combine = [*coverage, "combine", "-q", "--keep", rc, f"--data-file={total}"]
-    subprocess.run([*combine, *map(str, folders)], check=True, env=env)
+    # Of a folder, coverage takes only files named after the data file.
+    data_files = [str(path) for folder in folders for path in sorted(folder.glob(".coverage*"))]
+    subprocess.run([*combine, *data_files], check=True, env=env)
     report = folders[0].parent / "coverage.json"
     json_words = ["json", "-q", rc, f"--data-file={total}", "-o", str(report)]
     subprocess.run([*coverage, *json_words], check=True, env=env)
