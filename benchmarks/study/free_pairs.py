@@ -80,7 +80,7 @@ def _write_plant(out: Path) -> None:
 def _write_depth(
     path: Path, disparity: NDArray[np.generic], baseline_m: float, focal_px: float, offset: float
 ) -> None:
-    """Metres of disparities, 0 where there is none."""
+    """Depth in metres from disparity, 0 where the disparity is unknown."""
     shift = disparity.astype(np.float64)
     depth = np.where(shift > 0, baseline_m * focal_px / (shift + offset), 0)
     np.save(path, depth.astype(np.float32))

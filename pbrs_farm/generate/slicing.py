@@ -107,7 +107,7 @@ def _annealed(brief: Brief, draw: _Random, n_moves: int) -> tuple[list[IntRect],
     best, best_score = rects, (unmet, cost)
 
     def most() -> float:
-        """Maximum accepted cost of a move that is worse."""
+        """Largest accepted cost of a worse move."""
         return cost - temperature * math.log(draw() or 1e-300)
 
     cooling = (_T_END / _T_START) ** (1 / n_moves)

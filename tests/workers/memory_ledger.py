@@ -20,7 +20,7 @@ from workers.ledger.task_ledger import (
 
 @dataclass
 class MemoryLedger:
-    """What a slot and a coordinator call of RedisLedger, for tasks that a test inserts."""
+    """The methods of RedisLedger that slots and coordinators use, for tasks inserted by a test."""
 
     ready: list[str] = field(default_factory=list)
     queued: list[str] = field(default_factory=list)
@@ -163,7 +163,7 @@ class MemoryLedger:
 
 @dataclass
 class MemoryRegistry:
-    """What they call of Registry."""
+    """The methods of Registry that they use."""
 
     n_slots: dict[str, int] = field(default_factory=dict)
     refusals: list[str] = field(default_factory=list)

@@ -110,7 +110,7 @@ class HouseBuilder:
         return room_at(self.rooms, point)
 
     def add(self, item: Item, foot_y: float, place: F64 | None = None) -> None:
-        """Add an item to the level of foot_y; its room is that of its own room_id in the file.
+        """Add an item to the level of foot_y and to the room that the file calls item.room_id.
 
         Items without a room_id are in the room around the place (3,), if one is given. The rooms of
         tags `boundary_of:` are renamed, too.

@@ -78,7 +78,7 @@ class SobolSampler:
 
 
 def device_array(kind: Any, values: Any) -> Any:
-    """A 1D array on the device, in memory of Dr.Jit's own; one that is there already is returned.
+    """A 1D array on the device, in memory that Dr.Jit allocated; an array already there is returned.
 
     An array that merely wraps NumPy's memory may be less aligned; then its packet gathers fall
     apart into single ones, and the kernel is another one each time.
