@@ -1,4 +1,4 @@
-"""Waiting time of a trainer of a stream, and equality of its bytes; part of `make bench NAME=sets`.
+"""Waiting time of a trainer of a stream; part of `make bench NAME=sets`.
 
 The study's plan `lite` trains normals on 160x120 views of two generated homes, in batches of 8, on the cores that also
 render. The share of waiting is that of the steady state: seconds in which the training loop waits for its next batch,
@@ -9,24 +9,18 @@ long as they do on the shared cores; `stream.step_s` is their time with idle cor
 
 from __future__ import annotations
 
-import hashlib
 import tempfile
 import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any, Final
 
-import numpy as np
-
 import pbrs_farm as pf
 
 UNITS: Final = {
     "stream.wait_share": "share of the time that training waits for views with 4 epochs of reuse; two cores, 160x120",
     "stream.wait_share_2": "with 2 epochs of reuse",
-    "stream.wait_share_1": "without reuse",
     "stream.step_s": "s per step of 8 views of plan lite, with idle cores",
-    "stream.view_s": "s per rendered view during training without reuse",
-    "stream.same_bytes": "1: an epoch had the same bytes with 0 and 2 workers, and when rendered again after a kill",
 }
 _SET: Final = """
 [render]
@@ -37,7 +31,7 @@ views = 4
 """
 _BATCH: Final = 8
 # reuse -> first epoch; no two have a generation in common, and one of the homes has new views next
-_STARTS: Final = {4: 40, 2: 60, 1: 50}
+_STARTS: Final = {4: 40, 2: 60}
 
 
 def stream_figures() -> dict[str, Any]:
@@ -55,7 +49,6 @@ def _figures(file: Path, cache: Path) -> dict[str, Any]:
 
     step = _trainer()
     shares: dict[str, float] = {}
-    view_s = 0.0
     for reuse, first in _STARTS.items():
         epochs = stream(reuse)
         _waits(_batches(epochs.epoch(first), 1), step)
@@ -63,21 +56,12 @@ def _figures(file: Path, cache: Path) -> dict[str, Any]:
         waited_s, total_s = (sum(column) for column in zip(*waits, strict=True))
         suffix = f"_{reuse}" if reuse != 4 else ""
         shares[f"stream.wait_share{suffix}"] = round(waited_s / total_s, 3)
-        view_s = total_s / len(epochs)
         print(f"   reuse {reuse}: waited {waited_s:.1f} of {total_s:.1f} s", flush=True)
-    digests = {_digest(_batches(epochs.epoch(51), workers)) for workers in (0, 2)}
-    epochs.close()
-    for unit in epochs.plan.folder.glob("units/000000-000051.npz"):
-        unit.unlink()
-    digests.add(_digest(_batches(epochs.epoch(51), 2)))
-    epochs.close()
-    batch = next(iter(_batches(epochs.epoch(51), 0)))
-    epochs.close()
+        batch = next(iter(_batches(epochs.epoch(first), 0)))
+        epochs.close()
     return {
         **shares,
         "stream.step_s": round(min(_seconds(lambda: step(batch)) for _ in range(3)), 3),
-        "stream.view_s": round(view_s, 2),
-        "stream.same_bytes": int(len(digests) == 1),
     }
 
 
@@ -120,15 +104,6 @@ def _trainer() -> Callable[[Any], None]:
         optimiser.step()
 
     return step
-
-
-def _digest(batches: Any) -> str:
-    sha = hashlib.sha256()
-    for batch in batches:
-        for name, value in sorted(batch.items()):
-            data = value if isinstance(value, list) else np.asarray(value).tobytes()
-            sha.update(f"{name} {data!r}".encode())
-    return sha.hexdigest()
 
 
 def _seconds(act: Callable[[], None]) -> float:

@@ -102,7 +102,7 @@ class ViewForm:
 
     A module `forms/<name>.py` ends with one, its dashes written `_`; a plugin's entry point names
     one. The choices of --to, messages and docs/formats/export.md read the table; `READ_BACK` of
-    benchmarks/sets.py names the test that reads the form back.
+    tests/export/test_form.py names the test that reads the form back.
 
         FORM = ViewForm("words", write_words, "`words.tsv`: a line of words a view", options=WordOptions)
 

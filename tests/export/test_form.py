@@ -2,12 +2,12 @@
 
 from __future__ import annotations
 
+import re
 from pathlib import Path
 
 import pytest
 
 import pbrs_farm as pf
-from benchmarks.sets import READ_BACK
 from pbrs_farm.cli import build_parser, main
 from pbrs_farm.commands.set_file import set_from_bytes
 from pbrs_farm.core.errors import BadInput
@@ -23,6 +23,40 @@ from tests.export.homes import repaired_home
 
 DOCS = Path(__file__).parents[2] / "docs/formats"
 PAGES = {"views": DOCS / "export.md", "homes": DOCS / "simulators.md"}
+READ_BACK = {
+    "bop": "bop",
+    "captions": "captions",
+    "coco": "export",
+    "colmap": "sequences",
+    "cosmos": "trainer_forms",
+    "cotracker": "tapvid",
+    "fsd": "trainer_forms",
+    "hdf5": "export",
+    "hypersim": "hypersim",
+    "interiorverse": "trainer_forms",
+    "kitti": "sequences",
+    "layered-depth": "trainer_forms",
+    "layoutnet": "training_forms",
+    "lerobot": "trainer_forms",
+    "lidar": "lidar_form",
+    "lingbot": "trainer_forms",
+    "marigold": "training_forms",
+    "moge": "trainer_forms",
+    "nerfstudio": "sequences",
+    "openspatial": "trainer_forms",
+    "ply": "point_clouds",
+    "questions": "questions",
+    "released": "export",
+    "tapvid": "tapvid",
+    "tum": "sequences",
+    "wai": "trainer_forms",
+    "webdataset": "export",
+    "yolo": "export",
+    "yolo-depth": "training_forms",
+    "yolo-seg": "export",
+    "yolo-semantic": "training_forms",
+}
+"""Form of views -> tests/export/test_<name>.py, which reads it back by loaders written from its documentation."""
 
 
 @pytest.fixture(scope="module")
@@ -51,8 +85,12 @@ def test_the_docs_state_the_pixel_convention_of_each_form() -> None:
     assert [line.split("`")[1] for line in table.splitlines()[2:]] == views
 
 
-def test_the_bench_of_sets_reads_every_form_of_views_back() -> None:
+def test_every_form_of_views_is_read_back_by_a_test() -> None:
     assert list(READ_BACK) == [name for name in form_names() if form_of(name).of == "views"]
+    for name, file in READ_BACK.items():
+        assert re.search(
+            r"^\s*def test_", Path(__file__).with_name(f"test_{file}.py").read_text(), re.M
+        ), name
 
 
 def test_an_unknown_form_is_answered_with_those_there_are(root: Path, tmp_path: Path) -> None:
