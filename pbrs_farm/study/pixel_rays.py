@@ -51,6 +51,11 @@ def _span(rays: Tensor) -> tuple[Tensor, Tensor]:
     return ((first + last) / 2)[:, None, None], half[:, None, None]
 
 
+def focal_lengths(rays: Tensor) -> Tensor:
+    """(B,) focal lengths in pixels, the geometric mean of both axes."""
+    return (rays[:, 1, 1] - rays[:, 0, 0]).prod(-1).rsqrt()
+
+
 def ray_channels(rays: Tensor) -> Tensor:
     """(B, 3, H, W) unit directions, the input channels after colour."""
     directions = torch.cat([rays, torch.ones_like(rays[..., :1])], -1)

@@ -105,7 +105,8 @@ def camera_of_photograph(
     """(4,) fx, fy, cx, cy of a photograph in pixels, and their source.
 
     In this order: told_deg, a horizontal field of view (0 = none); an intrinsics file beside the
-    photograph; EXIF's 35 mm equivalent focal length, by the diagonal; assumed_deg.
+    photograph; EXIF's 35 mm equivalent focal length, by the diagonal; assumed_deg. Raises BadInput if
+    only assumed_deg is left and it is 0.
     """
     height, width = photograph.colour.shape[:2]
     folder = photograph.path.parent
@@ -116,8 +117,11 @@ def camera_of_photograph(
         source, f = "told", width / 2 / math.tan(math.radians(told_deg) / 2)
     elif photograph.focal_35mm:
         source, f = "EXIF", photograph.focal_35mm / _FILM_DIAGONAL_MM * math.hypot(width, height)
-    else:
+    elif assumed_deg:
         source, f = "assumed", width / 2 / math.tan(math.radians(assumed_deg) / 2)
+    else:
+        hint = "--hfov DEG (a phone's main camera: about 65), or intrinsics.json beside it"
+        raise BadInput(photograph.path, "", "no field of view known, which metres need", hint=hint)
     return np.array([f, f, width / 2, height / 2]), source
 
 
@@ -143,7 +147,7 @@ def predict_photographs(
     """
     make_folder(out)
     rows: list[dict[str, Any]] = []
-    for batch in _batches(run, files):
+    for batch in _batches(run, files, hfov_deg):
         began = time.perf_counter()
         photographs = [item for item in batch if isinstance(item, Photograph)]
         done = _predicted_rows(run, photographs, out, hfov_deg, mirror=mirror)
@@ -162,15 +166,20 @@ def _without_tiles(row: dict[str, Any]) -> dict[str, Any]:
     return {key: value for key, value in row.items() if key != "tiles"}
 
 
-def _batches(run: Trained, files: Sequence[Path]) -> Iterator[list[Photograph | dict[str, Any]]]:
+def _batches(
+    run: Trained, files: Sequence[Path], hfov_deg: float
+) -> Iterator[list[Photograph | dict[str, Any]]]:
     """Consecutive photographs of one network size, and rows of errors between them."""
     batch: list[Photograph | dict[str, Any]] = []
+    item: Photograph | dict[str, Any]
     batch_size: tuple[int, int] | None = None
     for path, name in zip(files, _output_names(files), strict=True):
         size = batch_size
         try:
-            item: Photograph | dict[str, Any] = read_photograph(path, name)
-            size = _size(run, item) if isinstance(item, Photograph) else size
+            item = read_photograph(path, name)
+            size = _size(run, item)
+            if run.plan.rays:
+                _camera(run, item, hfov_deg)
         except BadInput as error:
             item = {"photograph": shown(str(path), MAX_PLACE), "error": str(error)}
         if batch and (len(batch) == _BATCH or size != batch_size):
@@ -210,13 +219,19 @@ def _predicted_rows(
     facts: list[dict[str, Any]] = [{} for _ in photographs]
     scaled: F32 | None = None
     if run.plan.rays:
-        cameras = [camera_of_photograph(p, hfov_deg, run.plan.hfov_deg) for p in photographs]
+        cameras = [_camera(run, p, hfov_deg) for p in photographs]
         facts = [_camera_facts(p, *c) for p, c in zip(photographs, cameras, strict=True)]
         factors = np.array([[width / w, height / h] * 2 for h, w in sizes])
         scaled = (np.stack([K for K, _ in cameras]) * factors).astype(np.float32)
     predictions = predict(run.network, small, run.task, run.plan, sizes, scaled, mirror=mirror)
     for photograph, prediction, row in zip(photographs, predictions, facts, strict=True):
         yield _written(run, photograph, prediction, out) | row | {"mirror": mirror}
+
+
+def _camera(run: Trained, photograph: Photograph, hfov_deg: float) -> tuple[F64, str]:
+    """As camera_of_photograph; a lens is assumed unless metres would depend on it."""
+    assumed_deg = 0 if run.plan.rays and run.task.name == "depth" else run.plan.hfov_deg
+    return camera_of_photograph(photograph, hfov_deg, assumed_deg)
 
 
 def _camera_facts(photograph: Photograph, camera: F64, source: str) -> dict[str, Any]:

