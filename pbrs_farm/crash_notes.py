@@ -65,6 +65,11 @@ def is_watched() -> bool:
     return _NOW.is_watched
 
 
+def sends_notes() -> bool:
+    """True in the thread of a command's own process, which send_notes_to made it."""
+    return _FILE.get() is not None
+
+
 def current_step() -> str:
     """File and step of the last note; "" before the first."""
     return _NOW.step

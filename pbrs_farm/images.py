@@ -16,13 +16,23 @@ from pathlib import Path
 from typing import Any, Final
 
 import numpy as np
-import OpenImageIO as oiio  # noqa: N813
 from numpy.typing import NDArray
 
 from pbrs_farm.core.arrays import F32
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.core.file_kinds import kind_of
 from pbrs_farm.operating_system import OPEN_FILES, memory_file
+
+
+class _AtFirstUse:
+    # OpenImageIO starts a thread when it is loaded, so a process that has loaded it is not forked.
+    def __getattr__(self, name: str) -> Any:
+        import OpenImageIO
+
+        return getattr(OpenImageIO, name)
+
+
+oiio: Final = _AtFirstUse()
 
 MAX_FILE_PIXELS: Final = 16384 * 16384  # larger pictures are rejected before their pixels are read
 

@@ -6,6 +6,7 @@ those of each function. psutil is imported on use, since the command line import
 
 from __future__ import annotations
 
+import atexit
 import contextlib
 import ctypes
 import errno
@@ -15,8 +16,10 @@ import select
 import signal
 import stat
 import subprocess
+import sys
 import threading
 import time
+import traceback
 from collections.abc import Callable, Mapping, Sequence
 from importlib import import_module
 from pathlib import Path, PureWindowsPath
@@ -50,6 +53,41 @@ PATH_FROM_PARENT: Final = "import json, sys; sys.path[:] = json.loads(sys.argv[1
 
 
 # Processes
+
+
+def can_fork() -> bool:
+    """Whether `forked` works: on Linux alone, as macOS' own libraries break in a fork."""
+    return _POSIX and hasattr(os, "fork") and _has_proc()
+
+
+def forked(serve: Callable[[], object], log: IO[bytes]) -> subprocess.Popen[bytes]:
+    """A fork of this process in its own session that runs `serve`, with pipes and a log for standard error.
+
+    It keeps modules, and neither open files nor functions registered for the exit. Only if `can_fork`.
+    """
+
+    def run() -> None:
+        try:
+            # The other children's pipes are not ours, and Popen waits until its own is closed.
+            for link in list(Path("/proc/self/fd").iterdir()):
+                with contextlib.suppress(OSError):
+                    if int(link.name) > 2:
+                        os.close(int(link.name))
+            atexit._clear()
+            serve()
+        except BaseException:  # noqa: BLE001 - the parent's code must not run on here
+            traceback.print_exc()
+        os._exit(1)
+
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError):
+            stream.flush()
+    # Popen makes the pipes and forks; `run` never returns to it, so no program is executed.
+    pipe = subprocess.PIPE
+    return subprocess.Popen(
+        [sys.executable], stdin=pipe, stdout=pipe, stderr=log,
+        preexec_fn=run, restore_signals=False, **OWN_SESSION,
+    )  # fmt: skip
 
 
 def end_tree(process: subprocess.Popen[bytes]) -> None:

@@ -21,7 +21,6 @@ from pbrs_farm.core.layers import LAYER, LAYERS, layers_in_digest
 from pbrs_farm.core.plugins import marks_in_digest, plugins
 from pbrs_farm.core.recipe import CAMERA_SOURCES, CameraFields, Recipe
 from pbrs_farm.formats.marker import Marker, StoredFile, read_marker
-from pbrs_farm.formats.radiance_exr import FILE as RADIANCE_EXR
 from pbrs_farm.prepare import passes
 from pbrs_farm.prepare.source_ref import SourceRef
 from pbrs_farm.regular_files import (
@@ -169,7 +168,7 @@ def drop_radiance(work: Work) -> None:
         return
     if marker.files:
         replace_marker(work.store, key, marker.model_copy(update={"files": ()}).json_bytes())
-    work.store.delete(keys.view_key(work.house_id, work.view_id or "", RADIANCE_EXR))
+    work.store.delete(keys.view_key(work.house_id, work.view_id or "", LAYER["radiance"].file))
 
 
 def _written_layers(marker: Marker | None) -> tuple[str, ...]:

@@ -13,6 +13,8 @@ from pathlib import Path
 
 import pytest
 
+from pbrs_farm.operating_system import can_fork
+from pbrs_farm.run.processes import child_process
 from pbrs_farm.run.processes.child_process import ChildProcess, Handler, Message, Send
 from pbrs_farm.run.processes.limits import ProcessLimits
 from pbrs_farm.run.processes.render_process import Ended, RenderProcess
@@ -238,6 +240,18 @@ def test_an_early_process_serves_its_task_or_is_killed_without_one() -> None:
     assert bench.started[1].was_killed
 
 
+def test_only_a_process_without_threads_and_devices_is_forked(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    assert not child_process.may_fork()  # a test may hold anything
+    monkeypatch.setattr(child_process, "sends_notes", lambda: True)
+    for name in ("drjit", "mitsuba", "moderngl", "obstore", "OpenImageIO", "torch"):
+        monkeypatch.delitem(sys.modules, name, raising=False)
+    assert child_process.may_fork() == can_fork()
+    monkeypatch.setitem(sys.modules, "obstore", sys)
+    assert not child_process.may_fork()
+
+
 def make_handler(send: Send) -> Handler:
     """A real process for the test below: it acts according to the request's word."""
 
@@ -254,7 +268,13 @@ def make_handler(send: Send) -> Handler:
     return handle
 
 
-def test_real_processes_live_and_die_as_the_fake_ones(tmp_path: Path) -> None:
+@pytest.mark.parametrize("is_fork", [False, True])
+def test_real_processes_live_and_die_as_the_fake_ones(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_fork: bool
+) -> None:
+    if is_fork and not can_fork():
+        pytest.skip("forks on Linux only")
+    monkeypatch.setattr(child_process, "may_fork", lambda: is_fork)
     start = partial(ChildProcess, "tests.run.test_render_process:make_handler", tmp_path / "log")
     process = RenderProcess(start, ProcessLimits(silence_s=2.0))
 

@@ -3,20 +3,26 @@
 from __future__ import annotations
 
 import contextlib
+import contextvars
 import json
 import os
+import pkgutil
 import subprocess
 import sys
 from collections.abc import Callable
 from dataclasses import asdict, dataclass, field
+from functools import partial
 from pathlib import Path
-from typing import Any, Final, Literal, Protocol
+from typing import IO, Any, Final, Literal, NoReturn, Protocol
 
+from pbrs_farm.crash_notes import sends_notes
 from pbrs_farm.operating_system import (
     OWN_SESSION,
     PATH_FROM_PARENT,
     ReplyPipe,
+    can_fork,
     end_tree,
+    forked,
     resident_mb,
 )
 
@@ -48,12 +54,8 @@ class ChildProcess:
     def __init__(self, target: str, log: Path) -> None:
         self._log = log
         self._buffer = b""  # received, up to no line's end yet
-        # A new session: Ctrl-C does not reach it, and its children die with it.
-        command = [sys.executable, "-P", "-c", _BOOT, json.dumps(sys.path), target]
         with log.open("ab") as file:
-            self.process = subprocess.Popen(
-                command, stdin=subprocess.PIPE, stdout=subprocess.PIPE, stderr=file, **OWN_SESSION
-            )
+            self.process = (_forked if may_fork() else _started)(target, file)
         assert self.process.stdin is not None
         assert self.process.stdout is not None
         self._requests, self._replies = self.process.stdin, ReplyPipe(self.process.stdout)
@@ -131,6 +133,40 @@ class ChildProcess:
     def clear_log(self) -> None:
         """Empty its log: the next task's begins."""
         os.truncate(self._log, 0)
+
+
+_UNFORKABLE: Final = frozenset({"OpenImageIO", "drjit", "mitsuba", "moderngl", "obstore", "torch"})
+"""Modules that have threads or hold devices, which a fork would break."""
+# What all render processes load, without any of these.
+_LOADED_FIRST: Final = "pbrs_farm.run.steps"
+
+
+def may_fork() -> bool:
+    """Whether a render process is a fork of this one, which saves it half a second of loading modules.
+
+    Only of a command's own process: that of a notebook, a test or a farm may hold anything.
+    """
+    return can_fork() and sends_notes() and _UNFORKABLE.isdisjoint(sys.modules)
+
+
+def _started(target: str, log: IO[bytes]) -> subprocess.Popen[bytes]:
+    command = [sys.executable, "-P", "-c", _BOOT, json.dumps(sys.path), target]
+    pipe = subprocess.PIPE
+    return subprocess.Popen(command, stdin=pipe, stdout=pipe, stderr=log, **OWN_SESSION)
+
+
+def _forked(target: str, log: IO[bytes]) -> subprocess.Popen[bytes]:
+    for name in (target, _LOADED_FIRST):
+        with contextlib.suppress(Exception):  # the child reports it
+            pkgutil.resolve_name(name)
+    return forked(partial(_serve, target), log) if may_fork() else _started(target, log)
+
+
+def _serve(target: str) -> NoReturn:
+    from pbrs_farm.run.processes.task_loop import end, main
+
+    # In a context of its own, without the parent's notes.
+    end(contextvars.Context().run(main, target))
 
 
 # ready: it may be given a task. step: a step begins. waiting: storage does not answer.

@@ -1,7 +1,7 @@
 """The main loop of a render process: receives tasks, sends messages.
 
-Effects: those of the tasks; ends when its parent does. It is started afresh (never forked), so that S3
-and Mitsuba are safe in it, and may be killed at any moment. Requests are lines on the original stdin,
+Effects: those of the tasks; ends when its parent does. It is started afresh, or forked from a process
+without S3 and Mitsuba (child_process.may_fork), so that both are safe in it, and may be killed at any moment. Requests are lines on the original stdin,
 messages go to the original stdout; libraries print to stderr, the task's log.
 """
 
