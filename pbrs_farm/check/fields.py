@@ -83,11 +83,17 @@ def row_and_names(
     file: of a form with its word, below its split. field: "" for a file as a whole.
     """
     parts = tuple(field.split("."))
-    for row, pattern in _rows(table):
-        match = pattern.fullmatch(file)
-        if match and _fits(tuple(row.field.split(".")), parts):
-            return row, match.groupdict()
+    for row, names in _rows_of(file, table):
+        if _fits(tuple(row.field.split(".")), parts):
+            return row, dict(names)
     return None, {}
+
+
+@functools.lru_cache(1000)
+def _rows_of(file: str, table: str) -> tuple[tuple[FieldRow, dict[str, str]], ...]:
+    """The rows of a table that a file fits, with the names in the file's name."""
+    matches = ((row, pattern.fullmatch(file)) for row, pattern in _rows(table))
+    return tuple((row, match.groupdict()) for row, match in matches if match)
 
 
 def fields_of_set(stored: StoredSet) -> set[tuple[str, str]]:

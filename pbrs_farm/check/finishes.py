@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
@@ -19,12 +20,13 @@ _LEAST_METAL = 0.2  # luminance of Ks
 _WHITEST = 0.9  # of Kd beside Ks
 
 
-@dataclass(frozen=True, slots=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Finishes:
     """The gloss of a house's M materials."""
 
     rows: tuple[Mapping[str, Any], ...] = ()  # of house.json
 
+    @functools.cached_property
     def alpha(self) -> F64:
         """(M,) GGX roughness without maps: 0 = smooth, 1 = matte."""
         return np.array([_alpha(row) for row in self.rows])
@@ -33,10 +35,12 @@ class Finishes:
         """True if a roughness map of the material has an effect."""
         return self.rows[material]["kind"] in _MAPPED
 
+    @functools.cached_property
     def f0(self) -> F64:
         """(M, 3) linear reflectance at normal incidence, 0 of matte materials."""
         return np.array([_f0(row) for row in self.rows]).reshape(-1, 3)
 
+    @functools.cached_property
     def is_metal(self) -> Bools:
         """(M,) metals and mirrors."""
         return np.array([r["kind"] == "mirror" or _is_metal(r) for r in self.rows], bool)

@@ -182,8 +182,8 @@ def _check_surfaces(case: ViewCase, raw: Mapping[str, F64], *, noise: float) -> 
         fault = f"mirrors and glass scatter no light at {share:.0%} of {clear.sum()} pixels"
         case.expect("shading", "radiance.exr")(share >= _SHARE, fault)
     # The last entry of each table is for rays that hit nothing.
-    alpha = np.append(triangles.finishes.alpha(), 0.0)
-    has_coat = np.append(triangles.finishes.f0().any(axis=-1), False)
+    alpha = np.append(triangles.finishes.alpha, 0.0)
+    has_coat = np.append(triangles.finishes.f0.any(axis=-1), False)
     is_outside = np.append(case.now.shared(LitScene).is_outside, True)
     material = np.where(face >= 0, triangles.material[face], -1)
     matte = (kinds == "opaque") & (alpha[material] == 1) & ~has_coat[material] & ~is_outside[face]

@@ -10,7 +10,7 @@ two parallel surfaces within 0.1 mm is a fault of the source: a window frame in 
 from __future__ import annotations
 
 import functools
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Iterator, Mapping
 from dataclasses import dataclass
 from typing import Any, Final
 
@@ -33,6 +33,7 @@ _RAY_ERROR_MM = 2e-4  # per metre of depth, over the cosine: float32 directions 
 _MAX_RAY_ERROR_MM = 5.0
 _NORMAL_DEG = 0.02  # tolerance of a normal
 _SHADING_DEG = 0.5  # the same between texels of a map, whose bytes are half a degree apart
+_BATCH = 100_000  # triangles that rays are asked for at once
 _TIE_M = 1e-4  # two surfaces closer than this, across them, may both be hit
 _METRES = 2e-4  # tolerance of depths and positions stored as floats
 _ALBEDO_STEPS = 2.5  # of 255
@@ -227,13 +228,13 @@ def _roughness_is_right(stored: NDArray[Any], cast: Cast, _view: StoredView) -> 
 
 def _f0_is_right(stored: NDArray[Any], cast: Cast, _view: StoredView) -> Bools:
     triangles = cast.scene.triangles
-    linear = _where_hit(cast, lambda hit: triangles.finishes.f0()[triangles.material[hit.face]], 3)
+    linear = _where_hit(cast, lambda hit: triangles.finishes.f0[triangles.material[hit.face]], 3)
     return np.asarray(np.abs(stored - 255 * srgb_from_linear(linear)).max(axis=1) <= 0.51)
 
 
 def _is_metal(cast: Cast) -> Bools:
     triangles = cast.scene.triangles
-    return np.asarray(cast.of_face(triangles.of_material(triangles.finishes.is_metal())), bool)
+    return np.asarray(cast.of_face(triangles.of_material(triangles.finishes.is_metal)), bool)
 
 
 def _nocs_is_right(stored: NDArray[Any], cast: Cast, view: StoredView) -> Bools:
@@ -342,13 +343,26 @@ def _pierced_beside(cast: Cast, candidates: Callable[[int], I64]) -> I64:
     depth = cast.z - way
     # Measure gaps across the surface: along a slanting ray they are longer.
     across = np.abs(dot(cast.normal, cast.directions))
-    for k in range(len(cast)):
-        faces = candidates(k)
-        if len(faces):
-            gap = np.abs(distances_pierced(triangles, faces, starts[k], legs[k]) - depth[k])
-            if gap.min() * across[k] <= _TIE_M:
-                nearest[k] = faces[gap.argmin()]
+    for ray, faces in _batches(candidates, len(cast)):
+        gap = np.abs(distances_pierced(triangles, faces, starts[ray], legs[ray]) - depth[ray])
+        order = np.lexsort((gap, ray))
+        least = order[np.unique(ray[order], return_index=True)[1]]
+        ties = least[gap[least] * across[ray[least]] <= _TIE_M]
+        nearest[ray[ties]] = faces[ties]
     return rays.without_holes(nearest, cast.origin, cast.directions)
+
+
+def _batches(candidates: Callable[[int], I64], n_rays: int) -> Iterator[tuple[I64, I64]]:
+    """(ray, face) pairs of all rays and their candidates, some 100,000 at a time, each ray's together."""
+    found: list[I64] = []
+    n_found = 0
+    for k in range(n_rays):
+        found.append(candidates(k))
+        n_found += len(found[-1])
+        if k == n_rays - 1 or n_found > _BATCH:
+            rays = np.arange(k + 1 - len(found), k + 1)
+            yield np.repeat(rays, [len(faces) for faces in found]), np.concatenate(found)
+            found, n_found = [], 0
 
 
 def _number_planes(corners: F64) -> I64:
@@ -365,16 +379,16 @@ def _number_planes(corners: F64) -> I64:
 
 
 def distances_pierced(triangles: Triangles, faces: I64, origin: F64, ray: F64) -> F64:
-    """(F,) distance at which a ray pierces each of some triangles, in lengths of ray; inf = misses it."""
+    """(F,) distance at which rays pierce triangles, in lengths of ray; inf = misses it; one ray (3,) or (F, 3)."""
     a, b, c = (triangles.vertices[triangles.faces[faces, k]].astype(np.float64) for k in range(3))
-    # Moeller and Trumbore 1997, one ray and many triangles.
+    # Moeller and Trumbore 1997.
     e1, e2, s = b - a, c - a, origin - a
     p = np.cross(ray, e2)
     q = np.cross(s, e1)
     with np.errstate(divide="ignore", invalid="ignore"):
         inverse = 1 / dot(e1, p)
         # Barycentric coordinates, with slack at the edges, and the distance.
-        u, v = dot(s, p) * inverse, (q @ ray) * inverse
+        u, v = dot(s, p) * inverse, dot(q, ray) * inverse
         t = dot(e2, q) * inverse
         inside = (u >= -1e-6) & (v >= -1e-6) & (u + v <= 1 + 1e-6) & (t > 0)
     return np.where(inside, t, np.inf)

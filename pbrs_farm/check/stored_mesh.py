@@ -240,7 +240,7 @@ class Triangles:
     def alpha_at(self, face: I64, points: F64) -> F64:
         """(N,) GGX roughness at points (N, 3) on faces (N,), with maps."""
         material, uv = self.material[face], self.uv_at(face, points)
-        alpha = self.finishes.alpha()[material]
+        alpha = self.finishes.alpha[material]
 
         def multiply(number: int, chosen: Bools, pixels: Pixels) -> None:
             if self.finishes.is_mapped(number):
