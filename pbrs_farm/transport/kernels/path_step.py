@@ -266,19 +266,33 @@ def _emitted_light(
     context: PathContext, path: PathState, si: SurfaceInteraction, missed: Any
 ) -> tuple[Any, Any, Any]:
     """(outdoor, indoor light of the emitter a ray meets, the colour shown past the home, white for the sky)."""
-    emitters, emitter_filter = context.emitters, context.emitter_filter
-    by_scatter = path.bsdf_pdf > 0
-
-    def balanced(pdf: Any) -> Any:
-        return dr.select(by_scatter, path.bsdf_pdf / (path.bsdf_pdf + pdf), 1)
-
+    emitter_filter = context.emitter_filter
     # Leave out what the camera sees directly where one emitter is asked for: it needs no choice.
-    counts = mi.Bool(by_scatter)
+    counts = mi.Bool(path.bsdf_pdf > 0)
     for counted in emitter_filter:
         counts |= False if counted is None else counted == ALL_EMITTERS
     outdoor, indoor, sky_albedo = mi.Color3f(0), mi.Color3f(0), mi.Color3f(1)
     if emitter_filter.outdoor is not None:
-        reference, counted = path.reference.p, emitter_filter.outdoor
+        outdoor, sky_albedo = _sky_light(context, path, missed, counts)
+    if emitter_filter.indoor is not None:
+        shines = si.valid & counts & (emitter_filter.indoor > NO_EMITTERS) & (si.emitter != NO_LAMP)
+        indoor = _lamp_light(context, path, si, shines)
+    return outdoor, indoor, sky_albedo
+
+
+def _balanced(path: PathState, pdf: Any) -> Any:
+    """Weight of light that a ray meets, by the pdf with which a shadow ray would have found it."""
+    return dr.select(path.bsdf_pdf > 0, path.bsdf_pdf / (path.bsdf_pdf + pdf), 1)
+
+
+@dr.syntax
+def _sky_light(context: PathContext, path: PathState, missed: Any, counts: Any) -> tuple[Any, Any]:
+    """(light of the sky, or of surroundings before it, their colour) where rays leave the home."""
+    light, sky_albedo = mi.Color3f(0), mi.Color3f(1)
+    # Branch: packets of lanes whose rays are all at home pass by.
+    if missed:
+        emitters, counted = context.emitters, context.emitter_filter.outdoor
+        by_scatter, reference = path.bsdf_pdf > 0, path.reference.p
         chances = emitters.outdoor_choice.chances(reference, missed)
         sun, sun_pdf = emitters.eval_sun(chances, path.d, counted)
         is_seen = False if emitters.outside is None else ~by_scatter
@@ -286,25 +300,32 @@ def _emitted_light(
         # If only a portal counts, add only directions drawn through it.
         is_asked = (counted > NO_EMITTERS) & (counted < FIRST_PORTAL)
         sees_sky = missed & counts & emitters.has_sky & is_asked
-        if emitters.outside is not None:
+        if dr.hint(emitters.outside is not None, mode="scalar"):
             meets_sun = missed & by_scatter & (dr.max(sun) > 0)
             sun *= emitters.sun.past_outside(path.o, path.d, meets_sun)
-        sky = sun * balanced(sun_pdf) + dome * balanced(dome_pdf)
-        if emitters.outside is not None:
+        sky = sun * _balanced(path, sun_pdf) + dome * _balanced(path, dome_pdf)
+        if dr.hint(emitters.outside is not None, mode="scalar"):
             # Unscattered rays see the surroundings; for others their light is in the dome.
             beyond = emitters.outside.seen(context.scene, path.o, path.d, missed & ~by_scatter)
             sky = dr.select(beyond.valid, beyond.radiance, sky)
             sees_sky |= beyond.valid & counts & is_asked
             sky_albedo = dr.select(beyond.valid, beyond.albedo, sky_albedo)
-        outdoor = dr.select(sees_sky, path.beta * sky, 0)
-    if emitter_filter.indoor is not None:
-        shines = si.valid & counts & (emitter_filter.indoor > NO_EMITTERS) & (si.emitter != NO_LAMP)
+        light = dr.select(sees_sky, path.beta * sky, 0)
+    return light, sky_albedo
+
+
+@dr.syntax
+def _lamp_light(context: PathContext, path: PathState, si: SurfaceInteraction, shines: Any) -> Any:
+    """Color3f of the lamp that a ray meets."""
+    light = mi.Color3f(0)
+    # Branch: packets of lanes whose rays all meet something else pass by.
+    if shines:
         distance, cos = dr.norm(si.p - path.reference.p), dr.dot(path.d, si.ng)
-        radiance, lamp_pdf = emitters.eval_lamp(
-            si.emitter, path.reference, distance, cos, emitter_filter.indoor, shines
+        radiance, lamp_pdf = context.emitters.eval_lamp(
+            si.emitter, path.reference, distance, cos, context.emitter_filter.indoor, shines
         )
-        indoor = dr.select(shines, path.beta * radiance * balanced(lamp_pdf), 0)
-    return outdoor, indoor, sky_albedo
+        light = path.beta * radiance * _balanced(path, lamp_pdf)
+    return light
 
 
 def _scatter(step: _Step, goes_on: Any) -> ScatteredRay:
