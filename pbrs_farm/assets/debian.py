@@ -28,6 +28,7 @@ from pbrs_farm.assets.pinned_packages import PINS, download_pinned
 from pbrs_farm.core.errors import MachineFailed
 
 APT_TIMEOUT_S: Final = 600  # of one download
+_LOOK_EVERY: Final = 32  # new files of a folder
 _NOTE: Final = ".sha256"  # ending of the file beside a package that holds its hash
 
 
@@ -252,6 +253,25 @@ def write_whole(path: Path, data: bytes) -> None:
     with tempfile.NamedTemporaryFile(dir=path.parent, delete=False) as scratch:
         scratch.write(data)
     Path(scratch.name).replace(path)
+
+
+def drop_oldest(written: Path, most_bytes: int) -> None:
+    """Remove the oldest files of a new one's folder while they have more bytes than that.
+
+    Looks once per 32 new files whose names are hexadecimal digests.
+    """
+    if int(written.name[:8], 16) % _LOOK_EVERY:
+        return
+    files = []
+    for path in written.parent.glob("*.*"):
+        with contextlib.suppress(FileNotFoundError):  # another process took it out
+            files.append(((s := path.stat()).st_mtime, s.st_size, path))
+    spare = sum(n_bytes for _modified, n_bytes, _path in files) - most_bytes
+    for _modified, n_bytes, path in sorted(files):
+        if spare <= 0:
+            return
+        path.unlink(missing_ok=True)
+        spare -= n_bytes
 
 
 def version_of(deb: Path) -> str:

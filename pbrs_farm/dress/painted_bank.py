@@ -10,11 +10,11 @@ from functools import cache
 from importlib.metadata import version
 from pathlib import Path
 from threading import Lock
-from typing import Final, NamedTuple
+from typing import Final
 
 from pydantic import TypeAdapter, ValidationError
 
-from pbrs_farm.assets.debian import write_whole
+from pbrs_farm.assets.debian import drop_oldest, write_whole
 from pbrs_farm.core import keys
 from pbrs_farm.core.house import Material, Texture
 from pbrs_farm.dress.content import content
@@ -22,7 +22,6 @@ from pbrs_farm.dress.painted_materials import Painted, Painting
 
 MOST_BYTES: Final = 2_000_000_000  # maximum size; the oldest entries are removed first
 _MAKERS: Final = ("numpy", "OpenImageIO")  # the packages whose versions may change a pixel
-_LOOK_EVERY: Final = 32  # the size is checked once per this many additions
 
 
 @dataclass(frozen=True, slots=True)
@@ -34,12 +33,6 @@ class _Described:
 
 
 _DESCRIBED: Final = TypeAdapter(_Described)
-
-
-class _File(NamedTuple):
-    modified: float
-    n_bytes: int
-    path: Path
 
 
 class PaintedBank:
@@ -68,21 +61,8 @@ class PaintedBank:
         with suppress(OSError):
             self._folder.mkdir(parents=True, exist_ok=True)
             write_whole(path, _packed(painted))
-            if int(path.name[:8], 16) % _LOOK_EVERY == 0:
-                self._leave_out_oldest(self._folder)
+            drop_oldest(path, self._most_bytes)
         return painted
-
-    def _leave_out_oldest(self, folder: Path) -> None:
-        files = []
-        for path in folder.glob("*.painted"):
-            with suppress(FileNotFoundError):  # another process took it out
-                files.append(_File((s := path.stat()).st_mtime, s.st_size, path))
-        spare = sum(f.n_bytes for f in files) - self._most_bytes
-        for file in sorted(files):
-            if spare <= 0:
-                return
-            file.path.unlink(missing_ok=True)
-            spare -= file.n_bytes
 
 
 @cache

@@ -2,15 +2,18 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+import hashlib
+from collections.abc import Callable, Sequence
 from dataclasses import replace
-from functools import lru_cache
+from functools import cache, lru_cache
+from importlib.metadata import version
 from pathlib import Path
 
 from pbrs_farm.assets import furniture_package, homes_package
 from pbrs_farm.assets.debian import cache_folder
-from pbrs_farm.core.catalogue import Catalogue
+from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
 from pbrs_farm.core.house import Note
+from pbrs_farm.core.plugins import plugins
 from pbrs_farm.core.recipe import DressFields
 
 NO_FURNITURE = "no-furniture"
@@ -73,7 +76,37 @@ def _catalogue(
 
     of_libraries = _of_libraries(libraries, has_package).with_licences(licences)
     catalogue = content().with_families(of_libraries)
+    # Nobody can tell when the code of a plugin's furniture changes.
+    if not plugins("furniture"):
+        catalogue = replace(catalogue, load=_through_store(catalogue, of_libraries))
     return replace(catalogue, painted_folder=cache_folder() / "painted")
+
+
+def _through_store(
+    catalogue: Catalogue, of_libraries: Catalogue
+) -> Callable[[Piece], Shape | None]:
+    """Load the generated furniture from the store, too: its shapes depend on the code alone."""
+    from pbrs_farm.read.catalogue.read_catalogue import ShapeStore
+
+    store, known = ShapeStore(_store()), {piece.id for piece in of_libraries.pieces}
+
+    def load(piece: Piece) -> Shape | None:
+        if piece.id in known:
+            return catalogue.load(piece)
+        return store.shape((_families_code(), piece.id), lambda: catalogue.load(piece))
+
+    return load
+
+
+@cache
+def _families_code() -> str:
+    """The digest of the code that makes generated furniture, and of its tables."""
+    ours = Path(__file__).parents[1]
+    digest = hashlib.sha256(version("numpy").encode())
+    for folder in ("core", "geometry", "dress", "furnishings/things"):
+        for path in sorted((ours / folder).glob("*.*")):
+            digest.update(path.read_bytes())
+    return digest.hexdigest()
 
 
 def _of_libraries(libraries: tuple[tuple[Path, int], ...], has_package: bool | None) -> Catalogue:

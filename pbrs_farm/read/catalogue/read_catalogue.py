@@ -5,12 +5,11 @@ Effects: reads the libraries' catalogues and digests; shapes are read from them 
 
 from __future__ import annotations
 
-import io
-import zipfile
 from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from functools import partial
+from math import prod
 from pathlib import Path
 from typing import Any, Final
 
@@ -18,11 +17,12 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from pbrs_farm.assets.debian import write_whole
+from pbrs_farm.assets.debian import drop_oldest, write_whole
 from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import Catalogue, Picture, Piece, Shape
 from pbrs_farm.core.errors import BadInput
 from pbrs_farm.core.house import LightPart, Material, Surface, Texture
+from pbrs_farm.core.joints import Joint
 from pbrs_farm.read.catalogue.library_files import (
     FURNITURE,
     JAR_FURNITURE,
@@ -47,83 +47,115 @@ from pbrs_farm.read.catalogue.surface_pictures import (
 )
 from pbrs_farm.read.common.notes import Notes
 
-FORMAT: Final = 1
+FORMAT: Final = 2
+MOST_BYTES: Final = 1_000_000_000  # maximum size of a store; the oldest shapes are removed first
+_UNUSABLE: Final = b"\n"
+_ALIGNED: Final = 8  # arrays begin at multiples of this
+
+_Array = tuple[str, tuple[int, ...]]  # its type and shape
+
+
+@dataclass(frozen=True, slots=True)
+class _DescribedSurface:
+    name: str
+    material: int
+    part: str
+    arrays: tuple[_Array | None, ...]  # positions, faces, uvs, normals
 
 
 @dataclass(frozen=True, slots=True)
 class _Described:
-    # Fields of a shape that are not arrays.
-    names: tuple[str, ...]  # of the surfaces
-    numbers: tuple[int, ...]  # of their materials
+    # A shape but its arrays and pictures, which follow in this order.
+    surfaces: tuple[_DescribedSurface, ...]
     materials: tuple[Material, ...]
-    textures: tuple[tuple[str, str, str], ...]  # id, name, media type
+    textures: tuple[tuple[str, str, str, int], ...]  # id, name, media type, bytes
     lights: tuple[LightPart, ...]
+    joints: tuple[Joint, ...]
 
 
 _DESCRIBED: Final = TypeAdapter(_Described)
 
 
 class ShapeStore:
-    """Shapes by what they are made from."""
+    """Shapes by what they are made from, in a folder that processes may share."""
 
     def __init__(self, folder: Path) -> None:
         self._folder = folder
 
     def shape(self, key: tuple[str | int, ...], make: Callable[[], Shape | None]) -> Shape | None:
         """The cached shape of a key, which names all inputs; made if missing. None, cached too: unreadable."""
-        path = self._folder / f"{keys.digest(FORMAT, *key)}.npz"
-        with suppress(OSError, ValueError, KeyError, zipfile.BadZipFile, EOFError):
-            return _read_shape(path)
+        path = self._folder / f"{keys.digest(FORMAT, *key)}.shape"
+        with suppress(OSError, ValueError):
+            return _unpacked(path.read_bytes())
         shape = make()
         with suppress(OSError):
             self._folder.mkdir(parents=True, exist_ok=True)
             write_whole(path, _packed(shape))
+            drop_oldest(path, MOST_BYTES)
         return shape
 
 
 def _packed(shape: Shape | None) -> bytes:
-    buffer = io.BytesIO()
-    np.savez(buffer, **({} if shape is None else _arrays(shape)))  # type: ignore[arg-type]
-    return buffer.getvalue()
-
-
-def _arrays(shape: Shape) -> dict[str, NDArray[Any]]:
-    textures = tuple(shape.textures.values())
+    if shape is None:
+        return _UNUSABLE
+    arrays = [(s.positions, s.faces, s.uvs, s.normals) for s in shape.surfaces]
+    textures = shape.textures.values()
     described = _Described(
-        tuple(s.name for s in shape.surfaces),
-        tuple(s.material for s in shape.surfaces),
+        tuple(
+            _DescribedSurface(
+                s.name, s.material, s.part,
+                tuple(None if a is None else (a.dtype.str, a.shape) for a in of_surface),
+            )
+            for s, of_surface in zip(shape.surfaces, arrays, strict=True)
+        ),
         shape.materials,
-        tuple((t.id, t.name, t.media_type) for t in textures),
+        tuple((t.id, t.name, t.media_type, len(t.data)) for t in textures),
         shape.lights,
-    )
-    arrays: dict[str, NDArray[Any]] = {"described": _byte_array(_DESCRIBED.dump_json(described))}
-    for k, s in enumerate(shape.surfaces):
-        parts = {"p": s.positions, "f": s.faces, "u": s.uvs, "n": s.normals}
-        arrays |= {f"{name}{k}": part for name, part in parts.items() if part is not None}
-    return arrays | {f"t{k}": _byte_array(t.data) for k, t in enumerate(textures)}
+        shape.joints,
+    )  # fmt: skip
+    parts = [a.tobytes() for of_surface in arrays for a in of_surface if a is not None]
+    parts = [_DESCRIBED.dump_json(described) + b"\n", *parts, *(t.data for t in textures)]
+    return b"".join(part.ljust(_aligned(len(part))) for part in parts)
 
 
-def _byte_array(data: bytes) -> NDArray[np.uint8]:
-    return np.frombuffer(data, np.uint8)
+def _aligned(n_bytes: int) -> int:
+    return -(-n_bytes // _ALIGNED) * _ALIGNED
 
 
-def _read_shape(path: Path) -> Shape | None:
-    with path.open("rb") as stream, np.load(stream, allow_pickle=False) as file:
-        arrays = {name: file[name] for name in file.files}
-    if not arrays:
+def _unpacked(data: bytes) -> Shape | None:
+    """Inverse of _packed; ValueError for any other data."""
+    if data == _UNUSABLE:
         return None
-    d = _DESCRIBED.validate_json(arrays["described"].tobytes())
-    surfaces = tuple(
-        Surface(
-            name, arrays[f"p{k}"], arrays[f"f{k}"], number, arrays.get(f"u{k}"), arrays.get(f"n{k}")
-        )
-        for k, (name, number) in enumerate(zip(d.names, d.numbers, strict=True))
-    )
-    textures = {
-        i: Texture(i, name, kind, arrays[f"t{k}"].tobytes())
-        for k, (i, name, kind) in enumerate(d.textures)
-    }
-    return Shape(surfaces, d.materials, textures, d.lights)
+    end = data.index(b"\n") + 1
+    d = _DESCRIBED.validate_json(data[:end])
+    start = _aligned(end)
+
+    def taken(n_bytes: int) -> int:
+        nonlocal start
+        start += _aligned(n_bytes)
+        if start > len(data):
+            raise ValueError("cut short")
+        return start - _aligned(n_bytes)
+
+    def array(described: _Array | None) -> NDArray[Any] | None:
+        if described is None:
+            return None
+        kind, shape = np.dtype(described[0]), described[1]
+        n = prod(shape)
+        first = taken(n * kind.itemsize)
+        return np.frombuffer(data, kind, n, first).reshape(shape)
+
+    surfaces = []
+    for s in d.surfaces:
+        positions, faces, uvs, normals = map(array, s.arrays)
+        assert positions is not None
+        assert faces is not None
+        surfaces.append(Surface(s.name, positions, faces, s.material, uvs, normals, s.part))
+    textures = {}
+    for id_, name, kind, n_bytes in d.textures:
+        first = taken(n_bytes)
+        textures[id_] = Texture(id_, name, kind, data[first : first + n_bytes])
+    return Shape(tuple(surfaces), d.materials, textures, d.lights, d.joints)
 
 
 VERSION: Final = 3

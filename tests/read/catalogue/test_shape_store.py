@@ -1,5 +1,6 @@
 from __future__ import annotations
 
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -8,6 +9,7 @@ from numpy.testing import assert_array_equal
 
 from pbrs_farm.core.catalogue import Shape
 from pbrs_farm.core.house import LightPart, Material, MaterialKind, Texture
+from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.geometry.solids import box, sphere
 from pbrs_farm.read.catalogue.read_catalogue import ShapeStore, catalogue_from
@@ -21,8 +23,10 @@ def _shape() -> Shape:
         Material("w", texture_id="ab"),
     )
     light = LightPart((0.1, 0.2, 0.3), 0.03, 0.5, PowerUnit.SWEETHOME3D, emitting=(1,))
-    surfaces = (box("b", np.zeros(3), np.ones(3), 0), sphere("s", np.zeros(3), 1 / 3, 1))
-    return Shape(surfaces, materials, {"ab": texture}, (light,))
+    lid = replace(box("b", np.zeros(3), np.ones(3), 0), part="lid")
+    joint = Joint("lid", JointKind.REVOLUTE, (0.0, 1 / 3, 0.0), (1.0, 0.0, 0.0), 1.5)
+    surfaces = (lid, sphere("s", np.zeros(3), 1 / 3, 1))
+    return Shape(surfaces, materials, {"ab": texture}, (light,), (joint,))
 
 
 def _never() -> Shape | None:
@@ -34,11 +38,11 @@ def test_a_stored_shape_has_the_same_bits(tmp_path: Path) -> None:
     assert store.shape(("a", 1), lambda: shape) is shape
     again = store.shape(("a", 1), _never)
     assert again is not None
-    assert (again.materials, again.textures, again.lights) == (
-        shape.materials, shape.textures, shape.lights,
+    assert (again.materials, again.textures, again.lights, again.joints) == (
+        shape.materials, shape.textures, shape.lights, shape.joints,
     )  # fmt: skip
     for surface, two in zip(again.surfaces, shape.surfaces, strict=True):
-        assert (surface.name, surface.material) == (two.name, two.material)
+        assert (surface.name, surface.material, surface.part) == (two.name, two.material, two.part)
         for name in ("positions", "faces", "uvs", "normals"):
             assert_array_equal(getattr(surface, name), getattr(two, name))
 
@@ -49,12 +53,12 @@ def test_a_model_that_cannot_be_used_is_not_tried_again(tmp_path: Path) -> None:
     assert store.shape(("a",), _never) is None
 
 
-@pytest.mark.parametrize("data", [b"", b"PK\3\4", b"nothing"])
+@pytest.mark.parametrize("data", [b"", b"PK\3\4", b"nothing", b"cut"])
 def test_a_damaged_file_is_rebuilt(tmp_path: Path, data: bytes) -> None:
     store = ShapeStore(tmp_path)
     store.shape(("a",), _shape)
     (file,) = tmp_path.iterdir()
-    file.write_bytes(data)
+    file.write_bytes(file.read_bytes()[:-8] if data == b"cut" else data)
     assert store.shape(("a",), _shape) is not None
     assert store.shape(("a",), _never) is not None
 
