@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import math
 from dataclasses import replace
+from functools import cache
 
 import numpy as np
 import pytest
@@ -25,7 +26,9 @@ from tests.inputs.box_catalogue import boxes
 HOME = MadeHome(2, furniture=False, offices=0)
 
 
+@cache
 def empty_house() -> House:
+    """Drawn once: each drawing takes two seconds."""
     return read_home(generate_home(HOME, EMPTY).data, "home.sh3d")
 
 
