@@ -36,6 +36,7 @@ _TURN = 0.015  # between unit normals whose cosine is that
 _LEAST_AREA_M2 = 1e-5  # that two faces must share
 _SEEN_M2 = 1e-3  # that parts must share: less is a few pixels from near
 _LEAST_FACE_M2 = 1e-4  # minimum face area; smaller faces belong to round shapes
+_MOST_PAIRS = 256  # of triangles: the outlines of more are compared at once
 _ROUNDS = 3  # parts that lie in one plane by threes are moved by steps
 
 
@@ -137,6 +138,8 @@ def _pairs_in_one_plane(corners: F64, of: NDArray[np.intp]) -> list[tuple[int, i
                 if spans.min() < -_COINCIDE_M or longer[0] < 0 or 2 * longer.prod() < _SEEN_M2:
                     continue
                 axes = np.linalg.svd(normal[None])[2][1:]
+                if _most_shared_m2(members[part], members[earlier], axes) < 0.9 * _SEEN_M2:
+                    continue
                 for p in {part, earlier} - outlines.keys():
                     outlines[p] = _outline_of_faces(members[p], axes)
                 shared = shapely.intersection(outlines[part], outlines[earlier])
@@ -144,6 +147,21 @@ def _pairs_in_one_plane(corners: F64, of: NDArray[np.intp]) -> list[tuple[int, i
                     pairs.append((part, earlier, normal, offset))
                     break
     return pairs
+
+
+def _most_shared_m2(corners: F64, others: F64, axes: F64) -> float:
+    """At least the area that two groups of triangles of a plane share; infinite where it takes long."""
+    (a, low, high), (b, lows, highs) = (
+        (plan, *triangle_bounds(plan)) for plan in (c @ axes.T for c in (corners, others))
+    )
+    if len(a) * len(b) > _MOST_PAIRS:
+        return np.inf
+    meet = (high[:, None] > lows) & (low[:, None] < highs)
+    i, j = np.nonzero(meet.all(-1))
+    if not len(i):
+        return 0.0
+    shared = shapely.intersection(shapely.polygons(a[i]), shapely.polygons(b[j]))
+    return float(shapely.area(shared).sum())
 
 
 def _moved_in_plane(surface: Surface, normal: F64, offset: float) -> Surface:
