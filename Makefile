@@ -77,13 +77,13 @@ test-all: setup ## every other test for a machine without a GPU: long, slow, stu
 	@$(example-homes)
 	@mkdir -p out/test_all
 	@$(BIN)/pytest -n 4 -m chaos >out/test_all/farm.log 2>&1 & farm=$$!; \
-	$(BIN)/pytest -n 2 --dist loadfile --hypothesis-profile=long -m "$(REST)"; rest=$$?; \
+	$(BIN)/pytest -n 2 --dist worksteal --hypothesis-profile=long -m "$(REST)"; rest=$$?; \
 	wait $$farm; farm=$$?; cat out/test_all/farm.log; test $$rest = 0 -a $$farm = 0
 	$(BIN)/pytest -n 2 --dist loadfile -m web tests/board/web
 
 test-long: setup ## what make test leaves out below a minute a test: long, and all examples of hypothesis
 	@$(example-homes)
-	$(BIN)/pytest -n 2 --dist loadfile --hypothesis-profile=long -m "$(LONG)"
+	$(BIN)/pytest -n 2 --dist worksteal --hypothesis-profile=long -m "$(LONG)"
 
 test-oldest: setup ## the quick tests with the lowest versions that pyproject.toml names: out/oldest-venv; NAME=tests/store for a part
 	@bash scripts/test_versions.sh oldest "$(QUICK)" $(NAME)

@@ -21,6 +21,7 @@ from pbrs_farm.views.open_views import open_views
 from tests.check.falsehoods import FALSEHOODS, edit_json, planted, view_of
 from tests.check.roots import house_of, sign
 from tests.check.sorts_of_roots import ROOTS
+from tests.inputs.made_once import made_once
 
 Root = Callable[[str], Path]
 QUICK_SORTS = ("finished", "opened")
@@ -45,16 +46,8 @@ SORTS = [pytest.param(sort, marks=_marked(sort)) for sort in ROOTS]
 
 @pytest.fixture(scope="module")
 def finished_root(tmp_path_factory: pytest.TempPathFactory) -> Root:
-    """A root of a sort, rendered at its first use."""
-    roots: dict[str, Path] = {}
-
-    def root(sort: str) -> Path:
-        if sort not in roots:
-            roots[sort] = tmp_path_factory.mktemp("sorts") / sort
-            ROOTS[sort](roots[sort])
-        return roots[sort]
-
-    return root
+    """A root of a sort, rendered at its first use by any worker; only copies are changed."""
+    return lambda sort: made_once(tmp_path_factory, f"root {sort}", ROOTS[sort])
 
 
 @pytest.mark.parametrize("sort", SORTS)
