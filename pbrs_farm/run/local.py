@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 from pathlib import Path
+from typing import Final
 
 from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.shown_text import MAX_PLACE, shown
@@ -23,6 +24,8 @@ from pbrs_farm.run.processes.pool import Pool
 from pbrs_farm.run.processes.render_task import Setting
 from pbrs_farm.run.schedule import Schedule
 from pbrs_farm.store import store_from_url
+
+_FEW_SAMPLES: Final = 1 << 18  # of a view's light
 
 
 def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:
@@ -48,10 +51,8 @@ def run_local(run: Run, observe: Observer = lambda _event: None) -> Summary:
 
 def _pool(run: Run) -> Pool:
     """The run's processes: n_jobs of them, or one for light and one for all else."""
-    # Share the cores among the processes, or each would take them all.
     n_jobs = max(1, run.n_jobs)
-    n_threads = max(1, (os.cpu_count() or 1) // n_jobs)
-    setting = Setting(run.store_url, run.recipe, n_threads, run.debug, run.store)
+    setting = Setting(run.store_url, run.recipe, threads_of_process(run), run.debug, run.store)
     lanes = (n_jobs, int(finishes_apart(run)))
     limits = ProcessLimits(
         step_s=run.step_timeout_s,
@@ -59,6 +60,17 @@ def _pool(run: Run) -> Pool:
         memory_mb=run.memory_mb or memory_share_mb(sum(lanes)),
     )
     return Pool(lanes, setting, limits)
+
+
+def threads_of_process(run: Run) -> int:
+    """Threads that a process renders with: its share of the cores, or each would take them all."""
+    n_cores, image = os.cpu_count() or 1, run.recipe.image
+    if finishes_apart(run):
+        # Threads wait for work by asking for it all the time: for small views that is a seventh of
+        # the light's CPU, while the other process could use the core.
+        n_samples = image.width_px * image.height_px * run.recipe.light.spp
+        return n_cores - 1 if n_samples <= _FEW_SAMPLES else n_cores
+    return max(1, n_cores // max(1, run.n_jobs))
 
 
 def finishes_apart(run: Run) -> bool:

@@ -329,3 +329,25 @@ def test_views_are_finished_in_another_process_if_one_job_leaves_cores_idle(
     monkeypatch.setattr(limits, "machine_mb", lambda: memory_mb)
     request = Run(["builtin"], "somewhere", named("plain"), **fields)  # type: ignore[arg-type]
     assert local.finishes_apart(request) is is_apart
+
+
+@pytest.mark.parametrize(
+    ("width_px", "fields", "cores", "n_threads"),
+    [
+        (160, {}, 2, 1),
+        (160, {}, 16, 15),
+        (640, {}, 2, 2),
+        (160, {"n_jobs": 2}, 4, 2),
+        (160, {"n_jobs": 4}, 2, 1),
+    ],
+)
+def test_small_views_leave_a_core_to_the_process_that_finishes_them(
+    width_px: int, fields: dict[str, object], cores: int, n_threads: int,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:  # fmt: skip
+    monkeypatch.setattr(os, "cpu_count", lambda: cores)
+    monkeypatch.setattr(limits, "machine_mb", lambda: 16_000.0)
+    image = named("plain").image.model_copy(update={"width_px": width_px, "height_px": 120})
+    recipe = named("plain").model_copy(update={"image": image})
+    request = Run(["builtin"], "somewhere", recipe, **fields)  # type: ignore[arg-type]
+    assert local.threads_of_process(request) == n_threads
