@@ -79,6 +79,7 @@ class Rasterizer:
         self._targets: dict[tuple[int, int], RenderTarget] = {}  # (width, height)
         self._pictures = textures
         self._textures: dict[str, Any] = {}  # uploaded so far, by id
+        self._visible: tuple[object, I64] | None = None  # the last view and its visible draws
         self._upload(house, n_lights)
 
     def _upload(self, house: House, n_lights: int) -> None:
@@ -123,6 +124,7 @@ class Rasterizer:
                     rows = move_item(self._mesh, k + 1, house.items[k])
                     data = self._mesh.vertices[rows].tobytes()
                     self._vertices.write(data, offset=rows.start * self._mesh.vertices[0].nbytes)
+            self._visible = None
         self._house = house
 
     def __enter__(self) -> Rasterizer:
@@ -170,8 +172,13 @@ class Rasterizer:
         with self._context:
             target = self._target(camera)
             clip = clip_from_world(camera, far_plane(camera, *self._boxes))
-            order = self._front_to_back(camera, clip)
-            order = self._visible_draws(target, order, clip)
+            # Ask once for the pictures of both modes.
+            view = camera.intrinsics, camera.world_from_camera.tobytes()
+            if self._visible is None or self._visible[0] != view:
+                order = self._front_to_back(camera, clip)
+                self._visible = view, self._visible_draws(target, order, clip)
+            order = self._visible[1]
+            target.prepass_depth.use(1)
             # Draw opaque surfaces program by program, then blend the transparent ones over them.
             features = self._features[self._mesh.draw_material[order]]
             target.begin((*self._sky, 1.0))
@@ -208,7 +215,6 @@ class Rasterizer:
         for draw in draws[is_solid]:
             with self._queries[draw]:
                 self._draw(vao, int(draw))
-        target.prepass_depth.use(1)
         # Keep whatever may be seen through, unasked.
         visible = ~is_solid
         visible[is_solid] = [self._queries[draw].samples > 0 for draw in draws[is_solid]]

@@ -36,6 +36,7 @@ def _pinhole_coverage(item: Item, camera: Camera, cut_outs: CutOuts) -> Mask:
     i = camera.intrinsics
     starts = np.zeros((i.height_px, i.width_px + 1), np.int32)
     covered = np.zeros((i.height_px, i.width_px), np.bool_)
+    solid: list[F64] = []
     for s in item.surfaces:
         if not len(s.faces):
             continue
@@ -43,8 +44,11 @@ def _pinhole_coverage(item: Item, camera: Camera, cut_outs: CutOuts) -> Mask:
         if s.material in cut_outs:
             _cover_without_holes(covered, corners, s, cut_outs[s.material], i)
         else:
-            for spans in _spans_of_triangles(finite_triangles(corners), i):
-                _add_spans(starts, spans)
+            solid.append(finite_triangles(corners))
+    # All at once: most surfaces are small.
+    if solid:
+        for spans in _spans_of_triangles(np.concatenate(solid), i):
+            _add_spans(starts, spans)
     # Sum up the rows that the item reaches.
     used = starts.any(1)
     covered[used] |= np.cumsum(starts[used], axis=1, dtype=np.int32)[:, :-1] > 0
