@@ -10,7 +10,6 @@ import os
 import re
 import site
 import sys
-from importlib.machinery import ModuleSpec
 from pathlib import Path
 from typing import Any, Final
 
@@ -32,7 +31,6 @@ LIBRARY_PLACES: Final = (
     "/usr/local/opt/llvm*/lib/libLLVM*.dylib",
     "/Program Files/LLVM/bin/LLVM-C.dll",
 )
-_INTEGRATORS: Final = "mitsuba.python.ad.integrators"
 _UNNAMED: Final = (MIN_LLVM,)  # what a library without a version in its name counts as
 # Beside the LLVM of a wheel (karellen-llvm-core), as it needs them: each after those it is linked with.
 _BESIDE_LLVM: Final = ("libunwind.so.1.0", "libc++abi.so.1.0", "libc++.so.1.0")
@@ -103,28 +101,6 @@ def name_libraries() -> Path | None:
             for name in _BESIDE_LLVM if folder.is_dir() else ():
                 ctypes.CDLL(str(folder / name))
     return library
-
-
-class _NoIntegrators:
-    """Finder and loader that give Mitsuba an empty package of differentiable integrators."""
-
-    @staticmethod
-    def find_spec(name: str, _path: object = None, _target: object = None) -> ModuleSpec | None:
-        return ModuleSpec(name, _NoIntegrators) if name == _INTEGRATORS else None  # type: ignore[arg-type]
-
-    @staticmethod
-    def create_module(_spec: ModuleSpec) -> None:
-        """Make a usual module."""
-
-    @staticmethod
-    def exec_module(_module: object) -> None:
-        """Leave it empty."""
-
-
-def leave_out_integrators() -> None:
-    """Let this process load Mitsuba without its differentiable integrators: .07 s of CPU. Only in our own ones."""
-    if _NoIntegrators not in sys.meta_path:
-        sys.meta_path.insert(0, _NoIntegrators)  # type: ignore[arg-type]
 
 
 @functools.cache

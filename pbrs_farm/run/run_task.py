@@ -17,7 +17,7 @@ from typing import Any, Literal
 from pbrs_farm.core.errors import MachineFailed, PbrsError
 from pbrs_farm.core.shown_text import MAX_MESSAGE, shown
 from pbrs_farm.operating_system import give_back_memory, peak_mb
-from pbrs_farm.raycast.variant import choose_variant, leave_out_integrators, set_threads
+from pbrs_farm.raycast.variant import choose_variant, set_threads
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
 from pbrs_farm.run.processes.child_process import Handler, Message, Send
@@ -53,7 +53,6 @@ _OF_FINISHING = (
 
 def make_handler(send: Send) -> Handler:
     """The handler of a render process: answers each line with faults and "done", keeps the last house."""
-    leave_out_integrators()
     house_cache = HouseCache()
     atexit.register(house_cache.clear)
 
@@ -70,16 +69,14 @@ def make_handler(send: Send) -> Handler:
 
 def make_light_handler(send: Send) -> Handler:
     """As make_handler, with the libraries of light loaded, while the house is made."""
-    handle = make_handler(send)
     _load(_OF_LIGHT)
-    return handle
+    return make_handler(send)
 
 
 def make_finishing_handler(send: Send) -> Handler:
     """As make_handler, with what a house needs loaded before it is ready, while homes are still looked for."""
-    handle = make_handler(send)
     _load(_OF_FINISHING)
-    return handle
+    return make_handler(send)
 
 
 def _load(modules: Sequence[str]) -> None:
