@@ -212,6 +212,8 @@ def extra_inputs(name: str, work: Work) -> object:
     if name == "light":
         blurred = work.recipe.blur.shutter_s > 0
         changes = ["diffuse"] * bool(work.layers_of("light")) + ["moving objects blur"] * blurred
+        if work.recipe.shot(work.view_id or "").frame is not None:
+            changes.append("samples stay on surfaces")
         return changes or None
     if name == "develop":
         extra, shot = _extra_of_develop(work), work.recipe.shot(work.view_id or "")

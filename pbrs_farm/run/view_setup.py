@@ -29,7 +29,7 @@ if TYPE_CHECKING:
     from pbrs_farm.transport.surface_noise import NoiseAnchors
 
 FRAMES_A_PILOT: Final = 10
-FRAMES_AN_ANCHOR: Final = 20  # between two anchors, the frames whose pixels name the noise
+FRAMES_AN_ANCHOR: Final = 20  # between two anchors, the frames at which streams of noise begin
 _DEFAULT_FOCUS_M: Final = 100.0  # where the centre of the picture shows nothing
 
 
@@ -108,20 +108,18 @@ class ViewSetup:
 
     @cached_property
     def anchors(self) -> NoiseAnchors | None:
-        """The frames whose pixels name the noise of a film's frame; None for a still.
-
-        The film's last frame replaces a later anchor beyond its end.
-        """
+        """The frames that define a frame's noise; None for a still."""
         from pbrs_farm.transport.surface_noise import NoiseAnchors
 
-        frame = self.view.frame
-        if frame is None:
+        number = self.view.frame
+        if number is None:
             return None
-        last = max(view.frame for view in self.views.values() if view.frame is not None)
-        first = frame - frame % FRAMES_AN_ANCHOR
-        numbers = first, min(first + FRAMES_AN_ANCHOR, last)
-        early, late = (self.at_size(self._neighbour(number - frame)) for number in numbers)
-        return NoiseAnchors((early, late), numbers, (frame - first) / FRAMES_AN_ANCHOR)
+        later = number - number % FRAMES_AN_ANCHOR
+        first = max(later - FRAMES_AN_ANCHOR, 0)
+        views = [self._neighbour(n - number) for n in range(first, number + 1)]
+        frames = tuple((self.at_size(view), view.time_s) for view in views)
+        share = (number - later) / FRAMES_AN_ANCHOR if later else 0.0
+        return NoiseAnchors(frames, first, later - first, share)
 
     def at_size(self, view: View) -> Camera:
         """The camera of a view of the house at the picture's size."""

@@ -30,7 +30,7 @@ from pbrs_farm.transport.scene_tables.portals import panes_of_house, portals_of_
 from pbrs_farm.transport.scene_tables.scene_tables import SceneTables, moved_rows, tables_from_house
 from pbrs_farm.transport.scene_tables.sky import Sky
 from pbrs_farm.transport.scene_tables.texture_atlas import map_key
-from pbrs_farm.transport.surface_noise import NoiseAnchors, Streams, surface_streams
+from pbrs_farm.transport.surface_noise import NoiseAnchors, StreamWalk, SurfaceStreams
 
 if TYPE_CHECKING:
     from pbrs_farm.transport.kernels.emitters import Emitters, EmitterWeights
@@ -102,6 +102,7 @@ class LightScene:
         self._moving = moving  # the home and its panes; None where nothing moves
         self._panes = panes
         self._time_s: float | None = None  # that the device has
+        self._walk = StreamWalk()
         # OptiX takes one scene in a kernel: there windows show the sky alone.
         self._outside = outside if variant.startswith("llvm") else None
 
@@ -205,8 +206,8 @@ class LightScene:
         checkpoint: stores progress, and resumes an earlier render with equal arguments; the picture is the same
         with or without.
         pilot: of another view, whose emitter weights are reused; None = its own.
-        anchors: frames whose pixels define the random numbers of this view's surfaces, so that noise is fixed
-        to them; None: by pixel.
+        anchors: frames of a film up to this view, from which its surfaces have their random numbers, so that
+        noise is fixed to them; None: by pixel.
         splits_diffuse: also return the diffuse light of first surfaces (diffuse_images.py); `path` only.
         shutter_s: exposure time of a camera with blur; moving items are blurred around the scene's time.
 
@@ -247,7 +248,7 @@ class LightScene:
         from pbrs_farm.transport.sample_passes import SampledView, path_sums
 
         emitters, weights = self._emitters_of_pilot(pilot, fields)
-        streams = self._streams(camera, anchors) if anchors else None
+        streams = self._streams(anchors) if anchors else None
         view = SampledView(
             self.device_scene, emitters, camera, fields, seed, streams, splits_diffuse, move
         )
@@ -305,12 +306,18 @@ class LightScene:
             text, hint = "shading and residual need `path`", "--set light.integrator=path"
             raise RenderFailed(text, view=room_id, mode="light", seed=seed, hint=hint)
 
-    def _streams(self, camera: Camera, anchors: NoiseAnchors) -> Streams:
-        """(H * W,) the stream of each pixel's random numbers, by what its centre shows."""
+    def _streams(self, anchors: NoiseAnchors) -> SurfaceStreams:
+        """The streams of the pixels' random numbers, by what their centres show."""
         from pbrs_farm.transport.kernels.camera_rays import first_points
 
-        sharp = replace(camera, blur=None)
-        return surface_streams(first_points(self.device_scene, sharp), anchors)
+        def points(camera: Camera, time_s: float | None) -> F32:
+            self.move_to(time_s)
+            return first_points(self.device_scene, camera)
+
+        now_s = self._time_s
+        streams = self._walk.streams(anchors, points)
+        self.move_to(now_s)
+        return streams
 
     def _weights_by_name(self, weights: EmitterWeights) -> dict[str, float]:
         names = [lamp.name for lamp in self.tables.lamps]

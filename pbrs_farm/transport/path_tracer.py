@@ -39,6 +39,7 @@ from pbrs_farm.transport.kernels.path_state import (
 )
 from pbrs_farm.transport.kernels.path_step import advance
 from pbrs_farm.transport.kernels.sampler import SobolSampler, device_array, stream_key
+from pbrs_farm.transport.surface_noise import SurfaceStreams
 
 _NULLS_APART: Final = (
     12  # random dimensions, in vertices, between a reflection in glass and the path behind it
@@ -103,7 +104,7 @@ class Lanes:
     n_only_outdoor: int = 0  # the same, outdoor techniques
     n_lamps: int = 0  # 0, or the number of all lamps, to sum the light of each separately
     is_trial: bool = False  # count the shadow rays that arrive, too
-    streams: NDArray[np.uint32] | None = None  # (pixels,) of their random numbers; None: their own
+    streams: SurfaceStreams | None = None  # of the pixels' random numbers; None: their own
     splits_diffuse: bool = False  # sum what first surfaces would send if they were matte, too
 
     @property
@@ -120,6 +121,23 @@ class Lanes:
     def n_streams(self) -> int:
         """Streams of random numbers."""
         return self.width * self.height * max(self.n_only, 1)
+
+
+class _Numbers(NamedTuple):
+    """The random numbers of a lane."""
+
+    key: Any  # UInt32
+    shift: Any = None  # Point2f, as SurfaceStreams.shifts; None: no shift
+
+    def of_sample(self, s: Any) -> tuple[SobolSampler, Any]:
+        """The numbers of sample s, and its position within the pixel, in [0, 1)."""
+        sampler = SobolSampler(self.key, s)
+        place = sampler.get_2d(mi.UInt32(0))
+        if self.shift is not None:
+            place = place - self.shift
+            wraps = mi.Point2f(dr.select(place.x < 0, 1, 0), dr.select(place.y < 0, 1, 0))
+            place = dr.minimum(place + wraps, 1 - 2.0**-24)
+        return sampler, place
 
 
 class _LampSums(NamedTuple):
@@ -350,7 +368,7 @@ def trace(
         (pixel, dr.opaque(mi.UInt32, lanes.width)),
         dr.opaque(mi.UInt32, lanes.first_sample),
         dr.opaque(mi.UInt32, lanes.first_sample + lanes.n_samples),
-        _keys(stream, lanes),
+        _numbers(stream, lanes),
         _Beside(lamp_sums, counts, arrivals, counts_arrivals, diffuse_lamps),
     )
     dr.eval(total, diffuse, counts, arrivals)
@@ -381,12 +399,16 @@ def _no_lamp_sums(lane: Any, lanes: Lanes) -> _LampSums | None:
     return _LampSums(sums, lane * dr.opaque(mi.UInt32, lanes.n_lamps * 3))
 
 
-def _keys(stream: Any, lanes: Lanes) -> Any:
-    """The key of each lane's random numbers: an argument of the kernel, wherever it comes from."""
-    named = stream if lanes.streams is None else device_array(mi.UInt32, lanes.streams)
-    key = stream_key(named, dr.opaque(mi.UInt32, lanes.seed & 0xFFFFFFFF))
-    dr.eval(key)
-    return key
+def _numbers(stream: Any, lanes: Lanes) -> _Numbers:
+    """The random numbers of each lane: arguments of the kernel, wherever they come from."""
+    seed, shift = dr.opaque(mi.UInt32, lanes.seed & 0xFFFFFFFF), None
+    if lanes.streams is not None:
+        stream = device_array(mi.UInt32, lanes.streams.names)
+        x, y = (np.ascontiguousarray(axis) for axis in lanes.streams.shifts.T)
+        shift = mi.Point2f(device_array(mi.Float, x), device_array(mi.Float, y))
+    numbers = _Numbers(stream_key(stream, seed), shift)
+    dr.eval(numbers)
+    return numbers
 
 
 def _pixels_and_emitters(stream: Any, lanes: Lanes) -> tuple[Any, EmitterFilter]:
@@ -410,7 +432,7 @@ def _trace(
     pixel_width: tuple[Any, Any],
     first: Any,
     last: Any,
-    key: Any,
+    numbers: _Numbers,
     beside: _Beside,
 ) -> tuple[_LaneSums, _DiffuseSums | None]:
     sums = _LaneSums(
@@ -437,8 +459,8 @@ def _trace(
 
     while active:
         # Start the next sample where the last path has ended.
-        sampler = SobolSampler(key, s)
-        sample = film_position(sampler.get_2d(mi.UInt32(0)), context.fields.is_tent)
+        sampler, place = numbers.of_sample(s)
+        sample = film_position(place, context.fields.is_tent)
         path = dr.select(fresh, camera_path(camera, corner, sample, sampler), path)
         l_out, l_in = dr.select(fresh, mi.Color3f(0), l_out), dr.select(fresh, mi.Color3f(0), l_in)
         is_past_rough = is_past_rough & ~fresh

@@ -10,7 +10,6 @@ from dataclasses import dataclass, replace
 from typing import Any, Final
 
 import numpy as np
-from numpy.typing import NDArray
 
 from pbrs_farm.core.camera import Camera
 from pbrs_farm.core.recipe import LightFields
@@ -19,6 +18,7 @@ from pbrs_farm.transport.kernels.emitters import Emitters
 from pbrs_farm.transport.light_result import result_from_sums
 from pbrs_farm.transport.path_tracer import Lanes, SampleSums, sums_from_arrays, trace
 from pbrs_farm.transport.render_checkpoint import Arrays, RenderCheckpoint
+from pbrs_farm.transport.surface_noise import SurfaceStreams
 from pbrs_farm.transport.time_budget import TimeBudget
 
 MOST_PARTS: Final = 16
@@ -40,7 +40,7 @@ class SampledView:
     camera: Camera
     fields: LightFields
     seed: int
-    streams: NDArray[np.uint32] | None = None  # of each pixel's random numbers (surface_noise.py)
+    streams: SurfaceStreams | None = None  # of each pixel's random numbers (surface_noise.py)
     splits_diffuse: bool = False  # sum what first surfaces would send if they were matte, too
     move: Callable[[float], None] | None = None
     """Puts what moves where it is at a share of the shutter's time; None: nothing moves while it is open."""

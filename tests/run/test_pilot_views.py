@@ -19,12 +19,12 @@ from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.view_emitters import ViewEmitters
 
 
-def views() -> dict[str, View]:
+def views(n: int = 12) -> dict[str, View]:
     def camera(k: int) -> Camera:
         eye = np.array([2.5 + 0.03 * k, 1.5, 3.0])
         return Camera.look(Intrinsics.from_hfov(24, 18), eye, np.array([-0.5, -0.2, -1.0]))
 
-    frames = [View(f"frame_{k:05d}", "0_0", 0, camera(k), "walk", frame=k) for k in range(12)]
+    frames = [View(f"frame_{k:05d}", "0_0", 0, camera(k), "walk", frame=k) for k in range(n)]
     return {view.id: view for view in add_rig_views(frames, stereo_rig(0.065))}
 
 
@@ -106,10 +106,20 @@ def test_a_static_camera_sees_the_same_noise() -> None:
         ).indoor
         for setup in (setup_of(walk[f"frame_0000{k}"], walk, recipe) for k in (0, 1))
     )  # fmt: skip
-    # A share of the points changes to the next anchor: one step between consecutive frames.
-    same = float((first == second).all(-1).mean())
-    assert 0.8 < same < 1
-    assert np.abs(first - second).max() > 0
+    np.testing.assert_array_equal(first, second)
+    assert first.max() > 0
+
+
+def test_noise_begins_at_every_twentieth_frame_and_lasts_forty() -> None:
+    walk = views(45)
+    for number, first, later, share in (
+        (0, 0, 0, 0.0), (19, 0, 0, 0.0), (20, 0, 20, 0.0), (25, 0, 20, 0.25), (44, 20, 20, 0.2)
+    ):  # fmt: skip
+        anchors = setup_of(walk[f"frame_{number:05d}"], walk).anchors
+        assert anchors is not None
+        assert (anchors.first, anchors.later, anchors.share) == (first, later, share)
+        eyes = [camera.eye[0] for camera, _time_s in anchors.frames]
+        np.testing.assert_allclose(eyes, 2.5 + 0.03 * np.arange(first, number + 1))
 
 
 def test_a_view_that_is_no_frame_has_no_anchors() -> None:

@@ -1,67 +1,112 @@
-"""Streams of random numbers attached to surfaces: a camera moves along a wall by whole pixels."""
+"""Streams of random numbers attached to surfaces: a camera moves along a wall."""
 
 import itertools
 
 import numpy as np
 
 from pbrs_farm.core.camera import Camera, Intrinsics
-from pbrs_farm.transport.surface_noise import NoiseAnchors, surface_streams
+from pbrs_farm.transport.surface_noise import NoiseAnchors, StreamWalk, SurfaceStreams
 
 WIDTH, HEIGHT = 40, 30
 DISTANCE_M = 2.0
 
 
-def camera(px: float) -> Camera:
+def camera(px: float, distance_m: float = DISTANCE_M) -> Camera:
     """A camera facing the wall z = -DISTANCE_M, moved so that the picture shifts by px to the left."""
     i = Intrinsics.from_hfov(WIDTH, HEIGHT)
-    eye = np.array([px * DISTANCE_M / i.fx, 0.0, 0.0])
+    eye = np.array([px * DISTANCE_M / i.fx, 0.0, distance_m - DISTANCE_M])
     return Camera.look(i, eye, np.array([0.0, 0.0, -1.0]))
 
 
-def wall(of: Camera) -> np.ndarray:
+def wall(of: Camera, _time_s: float | None = None) -> np.ndarray:
     """(pixels, 3) points of the wall, slightly off the pixels' centres."""
     origin, directions = of.exact_rays()
-    points = (origin + DISTANCE_M * directions).reshape(-1, 3)
-    return points + np.array([1e-4, -1e-4, 0.0])
+    points = (origin + (DISTANCE_M + of.eye[2]) * directions).reshape(-1, 3)
+    return (points + np.array([1e-4, -1e-4, 0.0])).astype(np.float32)
 
 
-def streams(px: float, share: float) -> np.ndarray:
-    anchors = NoiseAnchors((camera(0), camera(7)), (20, 40), share)
-    return surface_streams(wall(camera(px)), anchors).reshape(HEIGHT, WIDTH)
+def anchors(places: list[float], later: int = 0, share: float = 0.0) -> NoiseAnchors:
+    return NoiseAnchors(tuple((camera(px), None) for px in places), 0, later, share)
+
+
+def film(places: list[float], later: int = 0, share: float = 0.0) -> SurfaceStreams:
+    """Streams of the last frame of a film, from the camera's places in px."""
+    return StreamWalk().streams(anchors(places, later, share), wall)
+
+
+def names(of: SurfaceStreams) -> np.ndarray:
+    return of.names.reshape(HEIGHT, WIDTH)
 
 
 def test_a_point_keeps_its_stream_while_the_camera_moves() -> None:
     for share in (0.0, 0.3, 1.0):
-        np.testing.assert_array_equal(streams(0, share)[:, 5:], streams(5, share)[:, :-5])
+        first, later = (film([0, 1, 3, 3 + n], 2, share) for n in (0, 5))
+        np.testing.assert_array_equal(names(first)[:, 5:], names(later)[:, :-5])
+
+
+def test_samples_keep_their_points_when_a_camera_moves_by_part_of_a_pixel() -> None:
+    first, later = film([0]), film([0, 0.3])
+    np.testing.assert_array_equal(first.names, later.names)
+    np.testing.assert_allclose(first.shifts, 0)
+    # The surface moves to the left by 0.3 px, and so does each sample in its pixel.
+    np.testing.assert_allclose(later.shifts[:, 0], 0.3, atol=0.02)
+    # After another 0.3 px the pixel to the right has the stream, 0.4 px to the left of its centre.
+    names_after = names(film([0, 0.3, 0.6]))
+    assert (names_after[:, :-1] == names(first)[:, :-1]).all()
+    after = film([0, 0.6])
+    np.testing.assert_array_equal(names(after)[:, :-1], names(first)[:, 1:])
+    np.testing.assert_allclose(after.shifts.reshape(HEIGHT, WIDTH, 2)[:, :-1, 0], 0.6, atol=0.02)
 
 
 def test_no_two_pixels_share_a_stream() -> None:
-    # At twice the distance four pixels fall into one of the anchor's.
-    near = camera(0)
-    points = np.repeat(wall(near), 4, 0)
-    many = surface_streams(points, NoiseAnchors((near, near), (0, 20), 0.5))
-    assert len(np.unique(many)) == len(points)
+    # At half the distance a pixel's surface fills four.
+    frames = (camera(0), None), (camera(0, DISTANCE_M / 2), None)
+    for share in (0.0, 0.5):
+        streams = StreamWalk().streams(NoiseAnchors(frames, 0, 1, share), wall)
+        assert len(np.unique(streams.names)) == WIDTH * HEIGHT
 
 
-def test_points_change_to_the_later_frame_one_by_one_and_do_not_return() -> None:
-    early = streams(0, 0.0)
-    gone = [streams(0, share) != early for share in np.linspace(0, 1, 11)]
+def test_points_change_to_the_later_anchor_one_by_one_and_do_not_return() -> None:
+    early = names(film([0, 0], 1, 0.0))
+    gone = [names(film([0, 0], 1, share)) != early for share in np.linspace(0, 1, 11)]
     assert [round(float(g.mean()), 1) for g in gone] == [round(k / 10, 1) for k in range(11)]
     for before, after in itertools.pairwise(gone):
         assert not (before & ~after).any()
 
 
 def test_frames_on_both_sides_of_an_anchor_agree() -> None:
-    # Points that changed to frame 40 have its streams.
-    ends = surface_streams(wall(camera(3)), NoiseAnchors((camera(0), camera(7)), (20, 40), 1.0))
-    begins = surface_streams(wall(camera(3)), NoiseAnchors((camera(7), camera(9)), (40, 60), 0.0))
-    np.testing.assert_array_equal(ends, begins)
+    # Streams of frame 2 are the later ones before frame 4, and the earlier ones from there on.
+    places = [0, 1, 2, 3, 5]
+    ends = film(places, 2, 1.0)
+    frames = anchors(places[2:]).frames
+    begins = StreamWalk().streams(NoiseAnchors(frames, 2, 2, 0.0), wall)
+    np.testing.assert_array_equal(ends.names, begins.names)
+    np.testing.assert_array_equal(ends.shifts, begins.shifts)
 
 
-def test_pixels_that_show_nothing_and_points_behind_an_anchor_have_streams_too() -> None:
-    points = wall(camera(0))
-    points[:50] = np.inf
-    points[50:100, 2] = 3.0
-    assert len(
-        np.unique(surface_streams(points, NoiseAnchors((camera(0),) * 2, (0, 20), 0.4)))
-    ) == (len(points))
+def test_streams_do_not_depend_on_the_frames_asked_for_before() -> None:
+    places = [0, 0.4, 1.1, 2.5, 2.7]
+    walk = StreamWalk()
+    for last in (2, 3, 3, 1, 5, 4):
+        asked = anchors(places[:last], 2 if last > 2 else 0, 0.4)
+        streams, fresh = walk.streams(asked, wall), StreamWalk().streams(asked, wall)
+        np.testing.assert_array_equal(streams.names, fresh.names)
+        np.testing.assert_array_equal(streams.shifts, fresh.shifts)
+    # Another film begins anew.
+    other = anchors([0, 3.0])
+    np.testing.assert_array_equal(walk.streams(other, wall).names, film([0, 3.0]).names)
+
+
+def test_pixels_that_show_nothing_have_streams_too() -> None:
+    def points(of: Camera, time_s: float | None) -> np.ndarray:
+        shown = wall(of, time_s)
+        shown[:50] = np.inf
+        return shown
+
+    streams = StreamWalk().streams(anchors([0, 1, 2], 1, 0.4), points)
+    assert len(np.unique(streams.names)) == WIDTH * HEIGHT
+    assert np.isfinite(streams.shifts).all()
+    # Without a surface, a pixel keeps its stream.
+    before = StreamWalk().streams(anchors([0, 1], 1, 0.0), points)
+    after = StreamWalk().streams(anchors([0, 1, 2], 1, 0.0), points)
+    np.testing.assert_array_equal(before.names[:50], after.names[:50])
