@@ -105,6 +105,8 @@ class Catalogue:
     pictures: tuple[Picture, ...] = ()
     notes: tuple[Note, ...] = ()
     own: frozenset[str] = frozenset()  # ids of the pieces of the user's own libraries
+    stored: Mapping[str, tuple[str | int, ...]] = field(default_factory=dict)
+    """Piece id -> key of its shape in the store of shapes, of those that are kept there."""
     painted_folder: Path | None = None  # where painted materials are kept for other homes
     _shapes: dict[str, Shape | None] = field(default_factory=dict, init=False, repr=False)
 

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache, lru_cache
 from importlib.metadata import version
@@ -11,6 +11,9 @@ from pathlib import Path
 
 from pbrs_farm.assets import furniture_package, homes_package
 from pbrs_farm.assets.debian import cache_folder
+from pbrs_farm.assets.furniture_package import FurniturePackage
+from pbrs_farm.assets.homes_package import Package
+from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import Catalogue, Piece, Shape
 from pbrs_farm.core.house import Note
 from pbrs_farm.core.plugins import plugins
@@ -72,38 +75,68 @@ def _stamp(path: Path) -> int:
 def _catalogue(
     libraries: tuple[tuple[Path, int], ...], has_package: bool | None, licences: tuple[str, ...]
 ) -> Catalogue:
-    from pbrs_farm.dress.content import content
+    @cache
+    def whole() -> Catalogue:
+        from pbrs_farm.dress.content import content
 
-    of_libraries = _of_libraries(libraries, has_package).with_licences(licences)
-    catalogue = content().with_families(of_libraries)
-    # Nobody can tell when the code of a plugin's furniture changes.
-    if not plugins("furniture"):
-        catalogue = replace(catalogue, load=_through_store(catalogue, of_libraries))
+        of_libraries = _of_libraries(libraries, has_package).with_licences(licences)
+        catalogue = content().with_families(of_libraries)
+        # Nobody can tell when the code of a plugin's furniture changes.
+        return catalogue if plugins("furniture") else _through_store(catalogue)
+
+    if libraries or plugins("furniture"):
+        catalogue = whole()
+    else:
+        from pbrs_farm.read.catalogue.read_catalogue import indexed
+
+        files = [] if has_package is None else _files_of_packages(has_package=has_package)
+        name = keys.digest(_code_of_catalogue(), licences, has_package, files)
+        catalogue = indexed(_store() / f"{name}.index", whole)
     return replace(catalogue, painted_folder=cache_folder() / "painted")
 
 
-def _through_store(
-    catalogue: Catalogue, of_libraries: Catalogue
-) -> Callable[[Piece], Shape | None]:
-    """Load the generated furniture from the store, too: its shapes depend on the code alone."""
+def _files_of_packages(*, has_package: bool) -> list[tuple[str, int, int]]:
+    package, program = _packages(has_package)
+    paths = [*(package.libraries if package else ()), *([program.jar] if program else ())]
+    stats = [(path, path.stat()) for path in paths]
+    notes = [(package.note, 0, 0)] if package else []
+    return [*notes, *((str(path), s.st_size, s.st_mtime_ns) for path, s in stats)]
+
+
+def _packages(has_package: bool) -> tuple[FurniturePackage | None, Package | None]:
+    return furniture_package.cached() if has_package else None, homes_package.cached()
+
+
+def _through_store(catalogue: Catalogue) -> Catalogue:
+    """The catalogue with generated furniture from the store, too: its shapes depend on the code alone."""
     from pbrs_farm.read.catalogue.read_catalogue import ShapeStore
 
-    store, known = ShapeStore(_store()), {piece.id for piece in of_libraries.pieces}
+    store, code = ShapeStore(_store()), _code_of_catalogue()
+    made = {p.id: (code, p.id) for p in catalogue.pieces if p.id not in catalogue.stored}
 
     def load(piece: Piece) -> Shape | None:
-        if piece.id in known:
+        if piece.id not in made:
             return catalogue.load(piece)
-        return store.shape((_families_code(), piece.id), lambda: catalogue.load(piece))
+        return store.shape(made[piece.id], lambda: catalogue.load(piece))
 
-    return load
+    return replace(catalogue, load=load, stored={**catalogue.stored, **made})
 
 
 @cache
-def _families_code() -> str:
-    """The digest of the code that makes generated furniture, and of its tables."""
+def _code_of_catalogue() -> str:
+    """The digest of the code that reads furniture and makes ours, and of its tables."""
     ours = Path(__file__).parents[1]
     digest = hashlib.sha256(version("numpy").encode())
-    for folder in ("core", "geometry", "dress", "furnishings/things"):
+    folders = (
+        "core",
+        "geometry",
+        "read/catalogue",
+        "read/common",
+        "read/mesh",
+        "dress",
+        "furnishings/things",
+    )
+    for folder in folders:
         for path in sorted((ours / folder).glob("*.*")):
             digest.update(path.read_bytes())
     return digest.hexdigest()
@@ -115,7 +148,7 @@ def _of_libraries(libraries: tuple[tuple[Path, int], ...], has_package: bool | N
     # None: no package needed.
     if has_package is None:
         return catalogue_from((), given=[path for path, _ in libraries], store=_store())
-    package, program = furniture_package.cached() if has_package else None, homes_package.cached()
+    package, program = _packages(has_package)
     catalogue = catalogue_from(
         package.libraries if package else (),
         jar=program.jar if program else None,

@@ -7,8 +7,9 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from contextlib import suppress
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from functools import partial
+from itertools import accumulate
 from math import prod
 from pathlib import Path
 from typing import Any, Final
@@ -21,7 +22,7 @@ from pbrs_farm.assets.debian import drop_oldest, write_whole
 from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import Catalogue, Picture, Piece, Shape
 from pbrs_farm.core.errors import BadInput
-from pbrs_farm.core.house import LightPart, Material, Surface, Texture
+from pbrs_farm.core.house import LightPart, Material, Note, Surface, Texture
 from pbrs_farm.core.joints import Joint
 from pbrs_farm.read.catalogue.library_files import (
     FURNITURE,
@@ -82,7 +83,7 @@ class ShapeStore:
     def __init__(self, folder: Path) -> None:
         self._folder = folder
 
-    def shape(self, key: tuple[str | int, ...], make: Callable[[], Shape | None]) -> Shape | None:
+    def shape(self, key: StoreKey, make: Callable[[], Shape | None]) -> Shape | None:
         """The cached shape of a key, which names all inputs; made if missing. None, cached too: unreadable."""
         path = self._folder / f"{keys.digest(FORMAT, *key)}.shape"
         with suppress(OSError, ValueError):
@@ -164,6 +165,7 @@ are known by. Raised when a piece or its shape changes."""
 _AS_WRITTEN: Final = PieceVerdict("", 0.0, "")
 
 Loader = Callable[[], Shape | None]
+StoreKey = tuple[str | int, ...]
 
 
 @dataclass(frozen=True, slots=True, eq=False)
@@ -203,10 +205,13 @@ def catalogue_from(
     shapes = ShapeStore(store) if store is not None else None
     pieces: dict[str, Piece] = {}
     loaders: dict[str, Loader] = {}
+    stored: dict[str, StoreKey] = {}
     for library in usable:
         for piece, loader in library.pieces:
-            pieces[piece.id] = piece
-            loaders[piece.id] = _load_through_store(shapes, library.sha256, piece, loader)
+            pieces[piece.id], loaders[piece.id] = piece, loader
+            if shapes is not None:
+                stored[piece.id] = key = _store_key(library.sha256, piece)
+                loaders[piece.id] = partial(shapes.shape, key, loader)
     return Catalogue(
         pieces=tuple(pieces.values()),
         load=lambda piece: loaders[piece.id]() if piece.id in loaders else None,
@@ -214,16 +219,66 @@ def catalogue_from(
         pictures=tuple({p.texture.id: p for f in usable for p in f.pictures}.values()),
         notes=notes.all(),
         own=frozenset(piece.id for f in users if f is not None for piece, _ in f.pieces),
+        stored=stored,
     )
 
 
-def _load_through_store(
-    shapes: ShapeStore | None, sha256: str, piece: Piece, load: Loader
-) -> Loader:
-    if shapes is None:
-        return load
-    key = (VERSION, sha256, piece.id, piece.group, piece.place.value)
-    return lambda: shapes.shape(key, load)
+def _store_key(sha256: str, piece: Piece) -> StoreKey:
+    return VERSION, sha256, piece.id, piece.group, piece.place.value
+
+
+@dataclass(frozen=True, slots=True)
+class _Index:
+    # A catalogue without the data of its pictures, which follow, and its shapes.
+    pieces: tuple[Piece, ...]
+    digest: str
+    pictures: tuple[Picture, ...]
+    sizes: tuple[int, ...]  # of their data, bytes
+    notes: tuple[Note, ...]
+    stored: dict[str, StoreKey]
+
+
+_INDEX: Final = TypeAdapter(_Index)
+
+
+def indexed(path: Path, make: Callable[[], Catalogue]) -> Catalogue:
+    """The catalogue whose index is stored at path, else made and stored; made as well for a missing shape.
+
+    make: gives a catalogue without the user's own pieces, all of them `stored`, and knows it the next time.
+    path: beside the shapes; its name holds everything that the catalogue depends on.
+    """
+    shapes = ShapeStore(path.parent)
+    with suppress(OSError, ValueError):
+        data = path.read_bytes()
+        end = data.index(b"\n") + 1
+        index = _INDEX.validate_json(data[:end])
+        ends = [end + n for n in accumulate(index.sizes)]
+        if len(data) != (ends[-1] if ends else end):
+            raise ValueError("cut short")
+        pictures = tuple(
+            replace(p, texture=replace(p.texture, data=data[e - n : e]))
+            for p, n, e in zip(index.pictures, index.sizes, ends, strict=True)
+        )
+
+        def load(piece: Piece) -> Shape | None:
+            return shapes.shape(index.stored[piece.id], lambda: make().load(piece))
+
+        return Catalogue(
+            index.pieces, load, index.digest, pictures, index.notes, stored=index.stored
+        )
+    catalogue = make()
+    pictures = catalogue.pictures
+    bare = tuple(replace(p, texture=replace(p.texture, data=b"")) for p in pictures)
+    sizes = tuple(len(p.texture.data) for p in pictures)
+    index = _Index(
+        catalogue.pieces, catalogue.digest, bare, sizes, catalogue.notes, dict(catalogue.stored)
+    )
+    with suppress(OSError):
+        path.parent.mkdir(parents=True, exist_ok=True)
+        write_whole(
+            path, _INDEX.dump_json(index) + b"\n" + b"".join(p.texture.data for p in pictures)
+        )
+    return catalogue
 
 
 def _given(path: Path, notes: Notes, store: Path | None, *, may_be_empty: bool) -> Found | None:

@@ -7,12 +7,12 @@ import numpy as np
 import pytest
 from numpy.testing import assert_array_equal
 
-from pbrs_farm.core.catalogue import Shape
+from pbrs_farm.core.catalogue import Catalogue, Picture, Shape
 from pbrs_farm.core.house import LightPart, Material, MaterialKind, Texture
 from pbrs_farm.core.joints import Joint, JointKind
 from pbrs_farm.core.lighting import PowerUnit
 from pbrs_farm.geometry.solids import box, sphere
-from pbrs_farm.read.catalogue.read_catalogue import ShapeStore, catalogue_from
+from pbrs_farm.read.catalogue.read_catalogue import ShapeStore, catalogue_from, indexed
 from tests.read.catalogue.small_library import entry, library
 
 
@@ -30,6 +30,10 @@ def _shape() -> Shape:
 
 
 def _never() -> Shape | None:
+    raise AssertionError("it was stored")
+
+
+def _not_again() -> Catalogue:
     raise AssertionError("it was stored")
 
 
@@ -79,3 +83,25 @@ def test_a_catalogue_with_a_store_gives_the_shapes_of_one_without(tmp_path: Path
     assert second is not None
     assert_array_equal(first.bounds, plain.bounds)
     assert_array_equal(second.surfaces[0].positions, plain.surfaces[0].positions)
+
+
+@pytest.mark.parametrize("damage", [0, 1, 30])
+def test_a_catalogue_of_an_index_is_the_one_that_was_made(tmp_path: Path, damage: int) -> None:
+    path, index = library(tmp_path, [entry("Dresser")]), tmp_path / "kept" / "0a0a0a0a.index"
+    texture = Texture("t", "wood", "image/png", b"\x89PNG\n\0")
+    made = replace(
+        catalogue_from([path], store=index.parent),
+        pictures=(Picture(texture, "wood", (0.5, 1 / 3)),),
+    )
+    assert indexed(index, lambda: made) is made
+    piece = made.pieces[0]
+    made_shape = made.shape(piece)
+    if damage:
+        index.write_bytes(index.read_bytes()[:-damage])
+        assert indexed(index, lambda: made) is made
+    again = indexed(index, _not_again)
+    assert (again.pieces, again.pictures, again.digest) == (made.pieces, made.pictures, made.digest)
+    shape = again.shape(piece)
+    assert made_shape is not None
+    assert shape is not None
+    assert_array_equal(shape.surfaces[0].positions, made_shape.surfaces[0].positions)
