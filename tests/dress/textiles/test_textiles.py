@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections import Counter
 from dataclasses import replace
+from functools import cache
 from typing import cast
 
 import numpy as np
@@ -55,6 +56,9 @@ def _dressed(seed: int, house: House | None = None, share: float = 1.0) -> Mutab
     return mutable
 
 
+_SEEN = cache(_dressed)  # for tests that only look
+
+
 def _added(mutable: MutableHouse, nyu40: int) -> list[Item]:
     return [i for i in mutable.items[len(mutable.source.items) :] if i.nyu40 == nyu40]
 
@@ -95,7 +99,7 @@ def test_a_panel_has_the_requested_folds() -> None:
 
 @pytest.mark.parametrize("seed", range(1, 9))
 def test_curtains_hang_from_the_wall_over_the_window(seed: int) -> None:
-    mutable = _dressed(seed)
+    mutable = _SEEN(seed)
     faces = {"window_living": (2, 0.0, 1.0), "window_bedroom": (2, 4.0, -1.0)}
     for item in _added(mutable, CURTAIN) + _added(mutable, BLINDS):
         points = np.concatenate([s.positions for s in item.surfaces])
@@ -171,7 +175,7 @@ def test_a_window_that_has_curtains_keeps_them() -> None:
 
 @pytest.mark.parametrize("seed", range(1, 9))
 def test_rugs_lie_flat_in_the_room_clear_of_doors(seed: int) -> None:
-    mutable = _dressed(seed)
+    mutable = _SEEN(seed)
     space = house_space(mutable)
     for item in _added(mutable, RUG):
         low, high = item.bounds
@@ -192,7 +196,7 @@ def test_some_seed_lays_a_large_rug_before_the_sofa() -> None:
     areas = [
         float(np.prod(np.ptp(i.bounds, axis=0)[[0, 2]]))
         for seed in range(1, 7)
-        for i in _added(_dressed(seed), RUG)
+        for i in _added(_SEEN(seed), RUG)
         if i.room_id == "0_0"
     ]
     assert max(areas) > 2.5

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections import Counter
+from functools import cache
 from itertools import pairwise
 
 import numpy as np
@@ -45,6 +46,9 @@ def _dressed(seed: int, share: float = 1.0, catalogue: Catalogue = EMPTY) -> Mut
     return mutable
 
 
+_SEEN = cache(_dressed)  # for tests that only look
+
+
 def _added(mutable: MutableHouse) -> list[Item]:
     return mutable.items[len(mutable.source.items) :]
 
@@ -59,7 +63,7 @@ def _face_of(item: Item, space: HouseSpace) -> WallFace:
 @pytest.mark.quick(2)
 @pytest.mark.parametrize("seed", range(1, 6))
 def test_items_hang_within_a_millimetre_of_the_wall(seed: int) -> None:
-    mutable = _dressed(seed)
+    mutable = _SEEN(seed)
     space = house_space(MutableHouse(builtin_home(), 1))
     assert _added(mutable)
     for item in _added(mutable):
@@ -71,7 +75,7 @@ def test_items_hang_within_a_millimetre_of_the_wall(seed: int) -> None:
 @pytest.mark.quick(2)
 @pytest.mark.parametrize("seed", range(1, 6))
 def test_nothing_hangs_over_an_opening_or_above_the_ceiling(seed: int) -> None:
-    mutable = _dressed(seed)
+    mutable = _SEEN(seed)
     space = house_space(MutableHouse(builtin_home(), 1))
     for item in _added(mutable):
         low, high = item.bounds
@@ -88,7 +92,7 @@ def test_nothing_hangs_over_an_opening_or_above_the_ceiling(seed: int) -> None:
 @pytest.mark.quick(2)
 @pytest.mark.parametrize("seed", range(1, 6))
 def test_wall_items_keep_clear_of_furniture_and_of_each_other(seed: int) -> None:
-    mutable = _dressed(seed)
+    mutable = _SEEN(seed)
     space = house_space(mutable)
     added = range(len(mutable.source.items), len(mutable.items))
     for n in added:
