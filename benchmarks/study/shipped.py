@@ -4,7 +4,7 @@
     python -m benchmarks.study.shipped render --depth --homes 24    homes of depth, 50 OpenGL views each
     python -m benchmarks.study.shipped train                 all tasks; hours of a core without a GPU
     python -m benchmarks.study.shipped train normals --on photos=/my/rgbd
-    python -m benchmarks.study.shipped install               the best seed of each task
+    python -m benchmarks.study.shipped install               the best seed of each task, if it beats a constant
 
 Every command resumes: finished homes and judged runs are skipped. Effects: out/study/shipped (or
 PBRS_STUDY_FOLDER/shipped); `install` writes deploy/weights.
@@ -180,7 +180,14 @@ def install() -> None:
         if not reports:
             print(f"{task}: no judged run, left as it is")
             continue
-        run = best_run(task, {path.parents[1]: json.loads(path.read_text()) for path in reports})
+        judged = {path.parents[1]: json.loads(path.read_text()) for path in reports}
+        run = best_run(task, judged)
+        baseline = json.loads((run / "figures.json").read_text())["baseline_name"]
+        if lost := lost_places(task, judged[run], baseline):
+            print(
+                f"{task}: {run.name} is no better than {baseline} on {', '.join(lost)}, not installed"
+            )
+            continue
         made_by = [f"{MADE_BY}{' --depth' * (task == 'depth')}"]
         packed = pack_weights(run, RUNS / "packed" / task, made_by=made_by)
         shutil.copytree(packed.root, weights_folder() / task, dirs_exist_ok=True)
@@ -196,6 +203,14 @@ def best_run(task: str, reports: dict[Path, dict[str, Any]]) -> Path:
         return float(row["figures"]["network"][figure])
 
     return best(reports, key=score)
+
+
+def lost_places(task: str, report: dict[str, Any], baseline: str) -> list[str]:
+    """Judges on which the network is no better than a constant prediction."""
+    figure, best = _BEST[task]
+    pairs = {row["on"]: row["figures"] for row in report["evaluations"]}
+    constant = {on: rows[baseline][figure] for on, rows in pairs.items()}
+    return [on for on, c in constant.items() if best(c, pairs[on]["network"][figure]) == c]
 
 
 def _program(*words: str) -> None:

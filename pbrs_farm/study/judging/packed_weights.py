@@ -31,7 +31,7 @@ _TOLD_RAYS: Final = " and the direction of each pixel's ray (`predict --hfov`)"
 _PREDICTS: Final = {
     "normals": "the surface normal at each pixel",
     "segmentation": "one of NYU's {n_classes} classes for each pixel",
-    "depth": "depth along the camera's axis",
+    "depth": "metres along the camera's axis",
     "boundaries": "the probability of an object boundary at each pixel",
 }
 _MOST_HOMES: Final = 12  # number of homes named on the card

@@ -32,6 +32,17 @@ def test_the_best_seed_is_the_one_with_the_best_figure_on_generated_homes(
     assert shipped.best_run(task, reports) == Path(best)
 
 
+def test_weights_that_a_constant_beats_somewhere_are_not_installed() -> None:
+    rows = {"made": (0.23, 0.34), "photos": (0.44, 0.37)}
+    report = {
+        "evaluations": [
+            {"on": on, "figures": {"network": {"abs_rel": net}, "mean depth": {"abs_rel": mean}}}
+            for on, (net, mean) in rows.items()
+        ]
+    }
+    assert shipped.lost_places("depth", report, "mean depth") == ["photos"]
+
+
 def test_an_unknown_task_is_rejected_by_name(capsys: pytest.CaptureFixture[str]) -> None:
     with pytest.raises(SystemExit):
         shipped.main(["train", "colours"])
