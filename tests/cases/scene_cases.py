@@ -127,7 +127,8 @@ def _half_open(form: str, folder: Path) -> Path:
     kinds = ((JointKind.REVOLUTE, 1.0), (JointKind.PRISMATIC, 2.5))
     items = [replace(cupboard(kind, x, kind.value), nyu40=3) for kind, x in kinds]
     opened = [item_at(i, i.joints[0].part, i.joints[0].upper / 2) for i in items]
-    export_house(replace(home, items=(*home.items, *opened)), folder / "home", form)
+    building = [item for item in home.items if not item.id.startswith("piece_")]
+    export_house(replace(home, items=(*building, *opened)), folder / "home", form)
     ending = {"usd": "*.usd*", "mjcf": "*.xml", "habitat": "*.scene_instance.json"}[form]
     return next((folder / "home").rglob(ending))
 

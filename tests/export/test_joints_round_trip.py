@@ -25,14 +25,18 @@ WITHOUT_STATE = ("urdf", "sdf")
 
 
 def half_open() -> House:
-    """The built-in home with two cupboards, of a door and of a drawer, all at half of their range."""
+    """The built-in home with two cupboards, of a door and of a drawer, all at half of their range.
+
+    Its furniture without joints is left out, which would take half of the time.
+    """
     home = builtin_home()
+    kept = [item for item in home.items if item.joints or not item.id.startswith("piece_")]
     items = []
     cupboards = (
         replace(cupboard(kind, x, kind.value), nyu40=NYU40_NAMES.index("cabinet"))
         for kind, x in ((JointKind.REVOLUTE, 1.0), (JointKind.PRISMATIC, 2.5))
     )
-    for item in (*home.items, *cupboards):
+    for item in (*kept, *cupboards):
         opened = item
         for joint in item.joints:
             opened = item_at(opened, joint.part, joint.upper / 2)
