@@ -67,7 +67,7 @@ class TrainingPlan:
     gamma: float = 0.2  # range of the exponent of brightness, 1 +- gamma
     tint: float = 0.08  # range of the factor of each channel, 1 +- tint
     hue: float = 0.0  # range of the rotation of hue, +- half turns
-    noise: float = 0.02  # standard deviation of noise, of 1
+    noise: float = 0.02  # maximum standard deviation of noise, of 1; drawn for each view
     # Machine
     device: str = "auto"  # auto, cpu, cuda
     threads: int = 0  # threads of torch, 0 = its default

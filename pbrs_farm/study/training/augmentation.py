@@ -38,7 +38,8 @@ def augment(batch: Batch, task: StudyTask, plan: TrainingPlan, dice: torch.Gener
     batch["colour"] = _relit(batch["colour"], plan, drawn)
     if plan.noise > 0:
         noise = torch.randn(batch["colour"].shape, generator=dice).to(device)
-        batch["colour"] = batch["colour"] + plan.noise * noise
+        # Of varying strength: at a fixed one, pictures without noise become foreign to the network.
+        batch["colour"] = batch["colour"] + plan.noise * drawn(1, 1, 1) * noise
     return batch
 
 

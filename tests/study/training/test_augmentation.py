@@ -47,6 +47,17 @@ def test_hue_changes_pictures_and_no_label() -> None:
     assert all(torch.equal(changed[name], label) for name, label in labels.items())
 
 
+def test_some_views_have_less_noise_than_others() -> None:
+    plan = small_plan(
+        hue="0", flip="false", gain="0", gamma="0", tint="0", noise="0.1", turn_deg="0"
+    )
+    batch = {"colour": torch.full((64, 3, 16, 16), 0.5)}
+    changed = augment(batch, task_of("normals"), plan, torch.Generator().manual_seed(5))
+    strengths = changed["colour"].std((1, 2, 3))
+    assert float(strengths.min()) < 0.01
+    assert 0.09 < float(strengths.max()) < 0.11
+
+
 def sphere(height: int = 96, width: int = 128, hfov_deg: float = 60.0) -> dict[str, torch.Tensor]:
     """A view from the middle of a sphere coloured by direction: no rotation changes its normals."""
     half = np.tan(np.radians(hfov_deg / 2))
