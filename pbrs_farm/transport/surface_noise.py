@@ -156,8 +156,8 @@ def _new_names(anchor: int, number: int, points: F32) -> NDArray[np.uint64]:
     """(N,) names of streams that begin in a frame; where no surface is seen, all frames have the same."""
     has_surface = np.isfinite(points).all(1)
     places = np.where(has_surface, anchor * MOST_FRAMES + number, (anchor + 1) * -MOST_FRAMES)
-    names = _mixed(places.astype(np.int64).view(np.uint64))
-    return _mixed(names + np.arange(len(points), dtype=np.uint64))
+    pixels: NDArray[np.uint64] = np.arange(len(points), dtype=np.uint64)
+    return _mixed(_mixed(places.astype(np.uint64)) + pixels)
 
 
 def _mixed(values: NDArray[np.uint64]) -> NDArray[np.uint64]:
