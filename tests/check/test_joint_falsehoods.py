@@ -52,7 +52,7 @@ Plant = Callable[[Row, Row], object]
 def house_of(
     pieces: Iterable[Piece], designs: Iterable[OpeningDesign] = (OpeningDesign(),)
 ) -> House:
-    """Pieces, doors and windows that open beside the built-in home, the first part of each left open."""
+    """Those of the pieces, doors and windows that open, beside the built-in home, the first part of each left open."""
     home = builtin_home()
     materials, items = list(home.materials), list(home.items)
     shapes = [(piece.id, piece.name, piece.nyu40, family_shape(piece)) for piece in pieces]
@@ -65,6 +65,7 @@ def house_of(
         rooms = (RoomType.LIVING if design.lights else RoomType.BATHROOM,)
         shape = opening_model(opening, 0.1, design, rooms)
         shapes.append((f"pbrs_farm#{kind}", str(kind), nyu40, shape))
+    shapes = [row for row in shapes if row[3].joints]
     for k, (source_class, name, nyu40, shape) in enumerate(shapes):
         pose = np.eye(4)
         pose[0, 3] = 50.0 + 4 * k
