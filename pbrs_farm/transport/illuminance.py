@@ -163,7 +163,8 @@ def _radiosity(context: PathContext, p: Any, normal: Any, key: Any, spp: Any) ->
     """Sums over spp samples of (outdoor, indoor) radiance reflected by a white surface."""
     outdoor, indoor = mi.Color3f(0), mi.Color3f(0)
     s = mi.UInt32(0)
-    while s < spp:
+    # What stays the same is no state of the loops: Dr.Jit would trace their code twice each.
+    while dr.hint(s < spp, exclude=[context, p, normal, key, spp]):
         # Add direct light at the point.
         sampler = SobolSampler(key, s)
         counted = context.emitter_filter.indoor
@@ -175,7 +176,7 @@ def _radiosity(context: PathContext, p: Any, normal: Any, key: Any, spp: Any) ->
         wo = mi.warp.square_to_cosine_hemisphere(sampler.get_2d(vertex.dim + 1))
         path = surface_path(vertex, mi.Vector3f(vertex.frame.to_world(wo)), wo.z * dr.inv_pi)
         active = mi.Bool(True)
-        while active:
+        while dr.hint(active, exclude=[context, sampler]):
             path, result, alive = advance(context, sampler, path, active)
             l_out += dr.select(active, result.emitted_outdoor + result.direct_outdoor, 0)
             l_in += dr.select(active, result.emitted_indoor + result.direct_indoor, 0)

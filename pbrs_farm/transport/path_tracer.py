@@ -457,7 +457,8 @@ def _trace(
     if dr.hint(context.splits_white, mode="scalar"):
         diffuse = _no_diffuse_sums()
 
-    while active:
+    # What stays the same is no state of the loop: Dr.Jit would trace its code twice.
+    while dr.hint(active, exclude=[context, camera, corner, last, numbers, beside]):
         # Start the next sample where the last path has ended.
         sampler, place = numbers.of_sample(s)
         sample = film_position(place, context.fields.is_tent)

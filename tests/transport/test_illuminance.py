@@ -15,8 +15,11 @@ from pbrs_farm.check.cases import HouseCase
 from pbrs_farm.check.certificate import Tally
 from pbrs_farm.check.sky_checks import check_illuminance
 from pbrs_farm.check.stored_house import StoredHouse
+from pbrs_farm.core.camera import Camera, Intrinsics
 from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.raycast.variant import choose_variant
+from pbrs_farm.read.builtin.builtin_home import builtin_home
+from pbrs_farm.transport import illuminance, path_tracer
 from pbrs_farm.transport.illuminance import illuminance_record, photometric_warnings
 from pbrs_farm.transport.light_scene import LightScene
 from pbrs_farm.transport.scene_tables.sky import dark_sky, sunsky
@@ -48,6 +51,28 @@ def test_a_black_room_has_only_the_direct_light_of_its_bulb() -> None:
     # Flux through a square of half edge 2 m, 2 m below an isotropic source: one face of a cube.
     assert lux["indoor"] == pytest.approx(1000 / 6 / 16, rel=0.03)
     assert lux["outdoor"] == 0
+
+
+def test_a_vertex_of_a_path_is_recorded_once_for_a_kernel(monkeypatch: pytest.MonkeyPatch) -> None:
+    house = builtin_home()
+    stored = house.cameras[0]
+    camera = Camera.look(Intrinsics.from_hfov(8, 6), stored.eye, stored.towards)
+    scene = LightScene.load(house, {}, RECIPE, sunsky(RECIPE, elevation_rad=0.6, azimuth_rad=0.3))
+    scene.floor_lux(house)
+    calls = []
+    for module in (illuminance, path_tracer):
+
+        def counted(*arguments: Any, advance: Any = module.advance, **by_name: Any) -> Any:
+            calls.append(advance)
+            return advance(*arguments, **by_name)
+
+        monkeypatch.setattr(module, "advance", counted)
+    scene.floor_lux(house)
+    assert len(calls) == len(house.rooms)
+    calls.clear()
+    # The pilot has a kernel, and the picture.
+    scene.render(camera, "0_0", RECIPE.light.model_copy(update={"spp": 1}), 1)
+    assert len(calls) == 2
 
 
 def test_rooms_outside_the_range_are_named_and_unlit_groups_are_not() -> None:

@@ -201,7 +201,7 @@ class DeviceScene:
         start = mi.Point3f(o)
         if dr.hint(self._has_holes, mode="scalar"):
             looks, n = mi.Bool(active), mi.UInt32(0)
-            while looks:
+            while dr.hint(looks, exclude=[self, d]):
                 si = self.intersect(start, d, looks)
                 looks &= si.valid & si.is_cutout & (n < MAX_SHEETS)
                 start = dr.select(looks, offset_ray_origin(si.p, -si.ng), start)
@@ -226,18 +226,23 @@ class DeviceScene:
     def _through_transparent(self, o: Any, d: Any, distance: Any, clear: Any) -> Any:
         share = dr.select(clear, mi.Color3f(1), 0)
         start = mi.Point3f(o)
-        reach, way = mi.Float(distance), mi.Vector3f(d)
+        reach = mi.Float(distance)
         end, is_finite = o + distance * d, distance < dr.inf
         go_on = mi.Bool(clear)
         n = mi.UInt32(0)
-        while go_on:
+        # What stays the same is no state of the loop: Dr.Jit would trace its code twice.
+        while dr.hint(go_on, exclude=[self, d, end, is_finite]):
+            way = mi.Vector3f(d)
+            if dr.hint(self._aims_again, mode="scalar"):
+                # The step aside must not make the ray graze the small lamp it ends at.
+                way = dr.select(is_finite & (n > 0), (end - start) / dr.maximum(reach, 1e-12), way)
             # Find the next transparent surface.
             sheet = self._transparent.ray_intersect_preliminary(
                 _ray(start, way, reach), False, go_on
             )
             is_hit = go_on & sheet.is_valid()
             # Branch: packets of lanes whose way is clear pass by.
-            if is_hit:
+            if dr.hint(is_hit, exclude=[self, d, end, is_finite]):
                 face = dr.gather(mi.UInt32, self._transparent_faces, sheet.prim_index, is_hit)
                 si = self._interaction(face, sheet.prim_uv, way, is_hit)
                 # Let through what glass does not reflect, all at a cut-out.
@@ -251,10 +256,7 @@ class DeviceScene:
                 reach = reach - dr.dot(beyond - start, way)
                 start = mi.Point3f(beyond)
                 if dr.hint(self._aims_again, mode="scalar"):
-                    # The step aside must not make the ray graze the small lamp it ends at.
-                    to = end - start
-                    reach = dr.select(is_finite, dr.norm(to), reach)
-                    way = dr.select(is_finite, to / dr.maximum(reach, 1e-12), way)
+                    reach = dr.select(is_finite, dr.norm(end - start), reach)
             n += 1
             brightest: Any = dr.max(share)
             go_on = is_hit & (brightest > 0) & (reach > 0) & (n < MAX_TRANSPARENT)

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import drjit as dr
@@ -205,7 +205,9 @@ def surface_path(vertex: Vertex, d: Any, pdf: Any) -> PathState:
     """The path from a vertex, which knows its lamps (near), in direction d with a pdf per solid angle."""
     assert vertex.near is not None
     origin = offset_ray_origin(vertex.si.p, vertex.si.ng)
-    return _first_ray(origin, d, mi.UInt32(1), vertex.near.reference, mi.Float(pdf))
+    path = _first_ray(origin, d, mi.UInt32(1), vertex.near.reference, mi.Float(pdf))
+    # A number of Python is no state of a loop, which would be traced twice for what never changes.
+    return replace(path, faintness=1.0)  # type: ignore[arg-type]
 
 
 def _first_ray(o: Any, d: Any, depth: Any, reference: ReferencePoint, pdf: Any) -> PathState:

@@ -305,6 +305,7 @@ def _sky_light(context: PathContext, path: PathState, missed: Any, counts: Any) 
             sun *= emitters.sun.past_outside(path.o, path.d, meets_sun)
         sky = sun * _balanced(path, sun_pdf) + dome * _balanced(path, dome_pdf)
         if dr.hint(emitters.outside is not None, mode="scalar"):
+            assert emitters.outside is not None
             # Unscattered rays see the surroundings; for others their light is in the dome.
             beyond = emitters.outside.seen(context.scene, path.o, path.d, missed & ~by_scatter)
             sky = dr.select(beyond.valid, beyond.radiance, sky)

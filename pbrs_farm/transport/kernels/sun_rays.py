@@ -118,7 +118,8 @@ def _worth_of(
     """Mean of wanted over the voxels where rays that scatter from si end."""
     begin, frame = offset_ray_origin(si.p, si.ng), mi.Frame3f(si.ng)
     total, n = mi.Float(0), mi.UInt32(0)
-    while active:
+    # What stays the same is no state of the loop: Dr.Jit would trace its code twice.
+    while dr.hint(active, exclude=[scene, grid, wanted, sampler, begin, frame]):
         wo = mi.warp.square_to_cosine_hemisphere(sampler.get_2d(4 + 2 * n))
         d = mi.Vector3f(frame.to_world(wo))
         o = _behind_glass(scene, begin, d)
@@ -134,7 +135,7 @@ def _behind_glass(scene: DeviceScene, o: Any, d: Any) -> Any:
     """Where a ray starts that passes all glass and cut-outs before its first other surface."""
     start, n = mi.Point3f(o), mi.UInt32(0)
     goes_on = dr.full(mi.Bool, True, dr.width(o))
-    while goes_on:
+    while dr.hint(goes_on, exclude=[scene, d]):
         si = scene.intersect(start, d, goes_on)
         passes = goes_on & si.valid & (si.is_cutout | (si.bsdf.kind == GLASS))
         start = dr.select(passes, offset_ray_origin(si.p, -si.ng), start)
