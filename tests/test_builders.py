@@ -19,7 +19,7 @@ _OURS = re.compile(r"(pbrs_farm|workers|benchmarks|scripts|tests)\b")
 
 # Without this a source has no such name: parsing all tests takes seconds.
 _MAYBE = re.compile(
-    r"[.\"']_[A-Za-z]|^\s*from .*\b_[A-Za-z]|^\s*from [^(\n]*\([^)]*\b_[A-Za-z]", re.M
+    r"[.\"']_[A-Za-z]|\bfrom .*\b_[A-Za-z]|^\s+_[A-Za-z]\w*(?: as \w+)?,?\s*(?:#.*)?$", re.M
 )
 
 
@@ -45,6 +45,9 @@ def private_names(source: str) -> Iterator[str]:
     [
         ("from pbrs_farm.doctor import _extras", 1),
         ("from pbrs_farm.doctor import (\n    checks,\n    _extras,\n)", 1),
+        ("from pbrs_farm.doctor import (  # noqa (both)\n    checks,\n    _extras,\n)", 1),
+        ("from pbrs_farm.doctor import \\\n    _extras", 1),
+        ("import os; from pbrs_farm.doctor import _extras", 1),
         ("doctor._extras()", 1),
         ("monkeypatch.setattr(doctor, '_extras', None)", 1),
         ("monkeypatch.setattr('pbrs_farm.doctor._extras', None)", 1),
