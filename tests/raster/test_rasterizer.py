@@ -292,8 +292,9 @@ def test_a_line_of_light_is_as_bright_as_many_points_along_it():
 
 
 def test_pictures_after_another_house_are_those_of_a_new_rasterizer() -> None:
-    near, far = item(square(-2.0, 0)), item(square(-3.0, 0))
-    before, after = house((near,), (WHITE,)), house((far,), (WHITE,))
+    near, far = (item(square(z, 0, half=4.0)) for z in (-2.0, -4.0))
+    hidden_before, materials = item(square(-3.0, 1, half=1.0)), (WHITE, RED)
+    before, after = (house((one, hidden_before), materials) for one in (near, far))
     with Rasterizer(before, {}) as raster:
         raster.render_dl(camera())
         raster.render_il(camera())
