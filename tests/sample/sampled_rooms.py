@@ -101,8 +101,10 @@ class IndependentLook:
 
     def clearance(self, point: NDArray[np.float64]) -> float:
         """Distance to the nearest triangle, metres."""
-        repeated = np.broadcast_to(point, (len(self.mesh.faces), 3))
-        nearest = trimesh.triangles.closest_point(self.mesh.triangles, repeated)
+        # Trimesh 4 divides by the edges of a triangle without an area.
+        triangles = self.mesh.triangles[self.mesh.area_faces > 0]
+        repeated = np.broadcast_to(point, (len(triangles), 3))
+        nearest = trimesh.triangles.closest_point(triangles, repeated)
         return float(np.linalg.norm(nearest - point, axis=1).min())
 
     def assert_rules_of_place(self, room: Room, camera: Camera, fields: CameraFields) -> None:

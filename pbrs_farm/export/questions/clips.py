@@ -283,7 +283,7 @@ def _nearest_place(triangles: F64, place: F64) -> tuple[F64, float]:
     near = triangles[to_box <= to_corner + 1e-9]
     places = trimesh.triangles.closest_point(near, np.broadcast_to(place, (len(near), 3)))
     gaps = np.linalg.norm(places - place, axis=1)
-    k = int(gaps.argmin())
+    k = int(np.nanargmin(gaps))  # trimesh 4 divides by the edges of a triangle without an area
     return np.asarray(places[k]), float(gaps[k])
 
 
