@@ -138,7 +138,7 @@ def _pairs_in_one_plane(corners: F64, of: NDArray[np.intp]) -> list[tuple[int, i
                 if spans.min() < -_COINCIDE_M or longer[0] < 0 or 2 * longer.prod() < _SEEN_M2:
                     continue
                 axes = np.linalg.svd(normal[None])[2][1:]
-                if _most_shared_m2(members[part], members[earlier], axes) < 0.9 * _SEEN_M2:
+                if most_shared_m2(members[part], members[earlier], axes) < 0.9 * _SEEN_M2:
                     continue
                 for p in {part, earlier} - outlines.keys():
                     outlines[p] = _outline_of_faces(members[p], axes)
@@ -149,8 +149,8 @@ def _pairs_in_one_plane(corners: F64, of: NDArray[np.intp]) -> list[tuple[int, i
     return pairs
 
 
-def _most_shared_m2(corners: F64, others: F64, axes: F64) -> float:
-    """At least the area that two groups of triangles of a plane share; infinite where it takes long."""
+def most_shared_m2(corners: F64, others: F64, axes: F64) -> float:
+    """At least the area that two groups of triangles of a plane share; inf for more than _MOST_PAIRS pairs."""
     (a, low, high), (b, lows, highs) = (
         (plan, *triangle_bounds(plan)) for plan in (c @ axes.T for c in (corners, others))
     )

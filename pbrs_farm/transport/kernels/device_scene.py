@@ -161,7 +161,7 @@ class DeviceScene:
 
     @dr.syntax
     def _look_again(self, ray: Any, face: Any, bary: Any, valid: Any, missed: Any) -> Any:
-        """As `_first_face`, with what the watertight test meets where the faster one met nothing."""
+        """Repeat missed rays with the watertight test."""
         face, bary, valid = mi.UInt32(face), mi.Point2f(bary), mi.Bool(valid)
         # Branch: no ray leaves a closed house, so most packets pass by.
         if missed:

@@ -6,13 +6,19 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+import shapely
 
 from pbrs_farm.core.house import Item, ItemKind, corners_of_surfaces
 from pbrs_farm.core.mesh import area_vectors
 from pbrs_farm.core.recipe import RepairFields
 from pbrs_farm.geometry.solids import box
 from pbrs_farm.repair import repair, summary_of_report
-from pbrs_farm.repair.structure.frames_apart import MOVED_M, with_frames_apart, with_parts_apart
+from pbrs_farm.repair.structure.frames_apart import (
+    MOVED_M,
+    most_shared_m2,
+    with_frames_apart,
+    with_parts_apart,
+)
 from tests.inputs.windowed_room import RECT, with_window
 from tests.repair.wall_rooms import WALL, covers, house, room, walls_around
 
@@ -102,3 +108,27 @@ def test_three_coplanar_pieces_are_all_moved_apart() -> None:
 def test_a_home_without_furniture_is_unchanged() -> None:
     source = house([*walls_around(RECT), *covers(room("0_0", RECT))], [room("0_0", RECT)])
     assert with_parts_apart(source) == (source, 0)
+
+
+def test_two_parts_share_no_more_than_the_early_exit_says() -> None:
+    dice = np.random.default_rng(5)
+    axes = np.eye(3)[:2]
+    n_shared = 0
+    for _ in range(300):
+        # Triangles of a plane, from slivers to wide ones, in parts of one to eight.
+        parts = []
+        for n in dice.integers(1, 9, 2):
+            centre, angle = dice.uniform(-0.1, 0.1, (n, 1, 2)), dice.uniform(0, np.pi, n)
+            flat = dice.uniform(-1, 1, (n, 3, 2)) * 10 ** dice.uniform(
+                [-1, -4], [0, -0.5], (n, 1, 2)
+            )
+            turn = np.array([[np.cos(angle), -np.sin(angle)], [np.sin(angle), np.cos(angle)]])
+            plan = centre + np.einsum("ijn,nkj->nki", turn, flat)
+            parts.append(np.concatenate([plan, np.zeros((n, 3, 1))], 2))
+        outlines = (
+            shapely.union_all(shapely.polygons(part @ axes.T), grid_size=1e-6) for part in parts
+        )
+        shared = shapely.area(shapely.intersection(*outlines))
+        assert most_shared_m2(parts[0], parts[1], axes) >= 0.9 * shared
+        n_shared += shared > 1e-3
+    assert 50 < n_shared < 250
