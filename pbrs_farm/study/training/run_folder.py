@@ -175,7 +175,10 @@ def finished_run(root: Path) -> tuple[RunFolder, dict[str, Any], TrainingPlan]:
 
 def plan_digest(plan: TrainingPlan) -> str:
     """First 16 hex digits of the sha256 over every field that affects weights or figures."""
-    text = json.dumps(plan_as_trained(plan), sort_keys=True)
+    row = plan_as_trained(plan)
+    if plan.noise > 0:
+        row["noise"] = [plan.noise, "at most"]  # once it was the strength in every view
+    text = json.dumps(row, sort_keys=True)
     return hashlib.sha256(text.encode()).hexdigest()[:16]
 
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import json
 import signal
 import subprocess
@@ -15,11 +16,11 @@ import torch
 from pbrs_farm.core.errors import BadInput, MachineFailed
 from pbrs_farm.study.tasks.tasks import task_of
 from pbrs_farm.study.training.checkpoint import read_tensors
-from pbrs_farm.study.training.run_folder import RunFolder, finished_run
+from pbrs_farm.study.training.run_folder import RunFolder, finished_run, plan_digest
 from pbrs_farm.study.training.training_job import Job, train
 from pbrs_farm.study.training.training_loop import LossFailed, seconds_a_step
 from pbrs_farm.study.training.training_views import BatchOrder
-from pbrs_farm.study.training_plan import TASKS, plan_of
+from pbrs_farm.study.training_plan import TASKS, plan_as_trained, plan_of
 from tests.study.training.made_views import SMALL, killed_plan, small_plan, views
 
 pytestmark = pytest.mark.study
@@ -193,6 +194,14 @@ def test_a_plan_for_a_gpu_reports_that_there_is_none(tmp_path: Path) -> None:
     with pytest.raises(MachineFailed, match="asks for a GPU"):
         train(Job(small_plan(device="cuda"), tmp_path), views(3, small_plan()))
     assert not (tmp_path / "run.json").exists()
+
+
+def test_checkpoints_with_noise_of_one_strength_are_of_another_plan() -> None:
+    for noise, is_same in (("0", True), ("0.02", False)):
+        plan = small_plan(noise=noise)
+        text = json.dumps(plan_as_trained(plan), sort_keys=True)
+        before = hashlib.sha256(text.encode()).hexdigest()[:16]
+        assert (plan_digest(plan) == before) == is_same
 
 
 def test_a_damaged_checkpoint_is_refused(tmp_path: Path) -> None:
