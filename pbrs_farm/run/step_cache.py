@@ -212,6 +212,7 @@ def extra_inputs(name: str, work: Work) -> object:
     if name == "light":
         blurred = work.recipe.blur.shutter_s > 0
         changes = ["diffuse"] * bool(work.layers_of("light")) + ["moving objects blur"] * blurred
+        # Metropolis too: its direct light and its guides follow surfaces.
         if work.recipe.shot(work.view_id or "").frame is not None:
             changes.append("samples stay on surfaces")
         return changes or None

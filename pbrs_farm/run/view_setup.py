@@ -109,17 +109,20 @@ class ViewSetup:
     @cached_property
     def anchors(self) -> NoiseAnchors | None:
         """The frames that define a frame's noise; None for a still."""
-        from pbrs_farm.transport.surface_noise import NoiseAnchors
+        from pbrs_farm.transport.surface_noise import FilmFrame, NoiseAnchors
 
-        number = self.view.frame
+        number, shot = self.view.frame, self.view.shot
         if number is None:
             return None
         later = number - number % FRAMES_AN_ANCHOR
         first = max(later - FRAMES_AN_ANCHOR, 0)
-        views = [self._neighbour(n - number) for n in range(first, number + 1)]
-        frames = tuple((self.at_size(view), view.time_s) for view in views)
+        frames = tuple(
+            FilmFrame(n, self.at_size(view), view.time_s)
+            for n in range(first, number + 1)
+            if (view := self.views.get(shot.partner(n - number).id)) is not None
+        )
         share = (number - later) / FRAMES_AN_ANCHOR if later else 0.0
-        return NoiseAnchors(frames, first, later - first, share)
+        return NoiseAnchors(frames, first, later - first, share, shot.eye)
 
     def at_size(self, view: View) -> Camera:
         """The camera of a view of the house at the picture's size."""

@@ -5,6 +5,7 @@ Effects: holds Mitsuba scenes and device buffers of the process's variant.
 
 from __future__ import annotations
 
+from collections import defaultdict
 from collections.abc import Callable, Collection
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -102,7 +103,8 @@ class LightScene:
         self._moving = moving  # the home and its panes; None where nothing moves
         self._panes = panes
         self._time_s: float | None = None  # that the device has
-        self._walk = StreamWalk()
+        # Rigs are rendered frame by frame, one eye after the other.
+        self._walks = defaultdict[str, StreamWalk](StreamWalk)
         # OptiX takes one scene in a kernel: there windows show the sky alone.
         self._outside = outside if variant.startswith("llvm") else None
 
@@ -315,7 +317,7 @@ class LightScene:
             return first_points(self.device_scene, camera)
 
         now_s = self._time_s
-        streams = self._walk.streams(anchors, points)
+        streams = self._walks[anchors.eye].streams(anchors, points)
         self.move_to(now_s)
         return streams
 

@@ -29,14 +29,23 @@ _OFFSET_STEPS: Final = (
 )
 
 
+class FilmFrame(NamedTuple):
+    """A frame of a film."""
+
+    number: int
+    camera: Camera  # at the picture's size
+    time_s: float | None
+
+
 @dataclass(frozen=True, slots=True, eq=False)
 class NoiseAnchors:
     """The frames of a film from an anchor to a frame."""
 
-    frames: tuple[tuple[Camera, float | None], ...]  # at the picture's size, with its time
+    frames: tuple[FilmFrame, ...]  # in order; some may be missing, also an anchor
     first: int  # number of the earlier anchor in the film
     later: int  # frames from it to the later one; 0 = no later one
     share: float  # of pixels that have gone over to the later one's streams, 0..1
+    eye: str = ""  # the rig's camera whose film it is
 
 
 class SurfaceStreams(NamedTuple):
@@ -60,7 +69,7 @@ class StreamWalk:
     """The streams of a film, frame by frame; remembers those of the last frame."""
 
     def __init__(self) -> None:
-        self._frames: list[tuple[Camera, float | None]] = []
+        self._frames: list[FilmFrame] = []
         self._first = self._later = -1
         self._points: F32 = np.zeros((0, 3), np.float32)  # (N, 3) of the last frame
         self._chains: list[_Chain] = []
@@ -76,7 +85,7 @@ class StreamWalk:
             self._frames, self._chains = [], []
             self._first, self._later = anchors.first, anchors.later
         for frame in anchors.frames[len(self._frames) :]:
-            self._go_on(frame, points_of(*frame))
+            self._go_on(frame, points_of(frame.camera, frame.time_s))
         early, late = self._chains[0], self._chains[-1]
         has_gone = (early.names & np.uint64(0xFFFFFFFF)) < anchors.share * 2.0**32
         names = np.where(has_gone, late.names, early.names)
@@ -89,23 +98,25 @@ class StreamWalk:
         if (self._first, self._later) != (anchors.first, anchors.later):
             return False
         return len(self._frames) <= len(anchors.frames) and all(
-            a_s == b_s and a.intrinsics == b.intrinsics
-            and np.array_equal(a.world_from_camera, b.world_from_camera)
-            for (a, a_s), (b, b_s) in zip(self._frames, anchors.frames, strict=False)
+            (a.number, a.time_s) == (b.number, b.time_s)
+            and a.camera.intrinsics == b.camera.intrinsics
+            and np.array_equal(a.camera.world_from_camera, b.camera.world_from_camera)
+            for a, b in zip(self._frames, anchors.frames, strict=False)
         )  # fmt: skip
 
-    def _go_on(self, frame: tuple[Camera, float | None], points: F32) -> None:
-        """Take over streams from the frame before; those of an anchor begin."""
-        number = self._first + len(self._frames)
+    def _go_on(self, frame: FilmFrame, points: F32) -> None:
+        """Take over streams from the frame before; those of an anchor begin there, or at the first frame after it."""
         if self._frames:
-            matches = _matches(points, self._points, self._frames[-1][0])
+            matches = _matches(points, self._points, self._frames[-1].camera)
             self._chains = [
-                _taken_over(chain, _new_names(chain.anchor, number, points), matches)
+                _taken_over(chain, _new_names(chain.anchor, frame.number, points), matches)
                 for chain in self._chains
             ]
-        if number in (self._first, self._first + self._later):
-            names = _new_names(number, number, points)
-            self._chains.append(_Chain(number, names, np.zeros((len(points), 2), np.float32)))
+        anchors = sorted({self._first, self._first + self._later})
+        for anchor in anchors[len(self._chains) :]:
+            if anchor <= frame.number:
+                names = _new_names(anchor, frame.number, points)
+                self._chains.append(_Chain(anchor, names, np.zeros((len(points), 2), np.float32)))
         self._frames.append(frame)
         self._points = points
 

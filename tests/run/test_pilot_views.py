@@ -118,8 +118,39 @@ def test_noise_begins_at_every_twentieth_frame_and_lasts_forty() -> None:
         anchors = setup_of(walk[f"frame_{number:05d}"], walk).anchors
         assert anchors is not None
         assert (anchors.first, anchors.later, anchors.share) == (first, later, share)
-        eyes = [camera.eye[0] for camera, _time_s in anchors.frames]
+        eyes = [frame.camera.eye[0] for frame in anchors.frames]
         np.testing.assert_allclose(eyes, 2.5 + 0.03 * np.arange(first, number + 1))
+
+
+def test_missing_frames_are_left_out_of_a_films_noise() -> None:
+    walk = views()
+    del walk["frame_00003"], walk["frame_00004"]
+    anchors = setup_of(walk["frame_00006"], walk).anchors
+    assert anchors is not None
+    assert [frame.number for frame in anchors.frames] == [0, 1, 2, 5, 6]
+    eyes = [frame.camera.eye[0] for frame in anchors.frames]
+    np.testing.assert_allclose(eyes, 2.5 + 0.03 * np.array([0, 1, 2, 5, 6]))
+
+
+def test_both_eyes_of_a_rig_see_each_frame_once(monkeypatch: pytest.MonkeyPatch) -> None:
+    recipe = recipe_from_name("preview", SMALL | {"light.spp": "1"})
+    house, _report = repair(builtin_home(), RepairFields())
+    sky = CachedHouse(MemoryStore(), recipe, house.id, "").sky
+    scene = LightScene.load(house, decoded_textures(house)[0], recipe, sky)
+    from pbrs_farm.transport.kernels import camera_rays  # needs the variant that the scene chose
+
+    walk = views(3)
+    asked: list[Camera] = []
+    first_points = camera_rays.first_points
+    monkeypatch.setattr(
+        camera_rays, "first_points", lambda s, c: (asked.append(c), first_points(s, c))[1]
+    )
+    for view in walk.values():
+        setup = setup_of(view, walk, recipe)
+        scene.render(
+            setup.at_size(view), "0_0", recipe.light, 7, pilot=setup.pilot, anchors=setup.anchors
+        )
+    assert [tuple(c.eye) for c in asked] == [tuple(v.camera.eye) for v in walk.values()]
 
 
 def test_a_view_that_is_no_frame_has_no_anchors() -> None:

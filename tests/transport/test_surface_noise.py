@@ -1,11 +1,12 @@
 """Streams of random numbers attached to surfaces: a camera moves along a wall."""
 
 import itertools
+from collections.abc import Sequence
 
 import numpy as np
 
 from pbrs_farm.core.camera import Camera, Intrinsics
-from pbrs_farm.transport.surface_noise import NoiseAnchors, StreamWalk, SurfaceStreams
+from pbrs_farm.transport.surface_noise import FilmFrame, NoiseAnchors, StreamWalk, SurfaceStreams
 
 WIDTH, HEIGHT = 40, 30
 DISTANCE_M = 2.0
@@ -25,13 +26,22 @@ def wall(of: Camera, _time_s: float | None = None) -> np.ndarray:
     return (points + np.array([1e-4, -1e-4, 0.0])).astype(np.float32)
 
 
-def anchors(places: list[float], later: int = 0, share: float = 0.0) -> NoiseAnchors:
-    return NoiseAnchors(tuple((camera(px), None) for px in places), 0, later, share)
+def anchors(
+    places: list[float], later: int = 0, share: float = 0.0, numbers: Sequence[int] | None = None
+) -> NoiseAnchors:
+    """A film from the camera's places in px; numbers: of its frames, where they do not count from 0."""
+    frames = zip(numbers or range(len(places)), map(camera, places), itertools.repeat(None))
+    return NoiseAnchors(tuple(itertools.starmap(FilmFrame, frames)), 0, later, share)
 
 
 def film(places: list[float], later: int = 0, share: float = 0.0) -> SurfaceStreams:
     """Streams of the last frame of a film, from the camera's places in px."""
     return StreamWalk().streams(anchors(places, later, share), wall)
+
+
+def begun_at(anchor: int, frames: tuple[FilmFrame, ...]) -> NoiseAnchors:
+    """The streams of an anchor alone."""
+    return NoiseAnchors(frames, anchor, anchor, 0.0)
 
 
 def names(of: SurfaceStreams) -> np.ndarray:
@@ -60,7 +70,8 @@ def test_samples_keep_their_points_when_a_camera_moves_by_part_of_a_pixel() -> N
 
 def test_no_two_pixels_share_a_stream() -> None:
     # At half the distance a pixel's surface fills four.
-    frames = (camera(0), None), (camera(0, DISTANCE_M / 2), None)
+    cameras = camera(0), camera(0, DISTANCE_M / 2)
+    frames = tuple(FilmFrame(n, c, None) for n, c in enumerate(cameras))
     for share in (0.0, 0.5):
         streams = StreamWalk().streams(NoiseAnchors(frames, 0, 1, share), wall)
         assert len(np.unique(streams.names)) == WIDTH * HEIGHT
@@ -78,8 +89,31 @@ def test_frames_on_both_sides_of_an_anchor_agree() -> None:
     # Streams of frame 2 are the later ones before frame 4, and the earlier ones from there on.
     places = [0, 1, 2, 3, 5]
     ends = film(places, 2, 1.0)
-    frames = anchors(places[2:]).frames
-    begins = StreamWalk().streams(NoiseAnchors(frames, 2, 2, 0.0), wall)
+    begins = StreamWalk().streams(begun_at(2, anchors(places).frames[2:]), wall)
+    np.testing.assert_array_equal(ends.names, begins.names)
+    np.testing.assert_array_equal(ends.shifts, begins.shifts)
+
+
+def test_a_film_with_gaps_keeps_its_streams_and_is_seen_once() -> None:
+    numbers, places = [0, 1, 4, 5, 7], [0, 1, 3, 4, 6]  # without frames 2, 3 and 6
+    asked = []
+
+    def seen(of: Camera, time_s: float | None) -> np.ndarray:
+        asked.append(of)
+        return wall(of, time_s)
+
+    walk = StreamWalk()
+    films = [names(walk.streams(anchors(places[:n], 2, 0.4, numbers[:n]), seen)) for n in (3, 4, 5)]
+    assert len(asked) == 5
+    for before, after, px in zip(films, films[1:], (1, 2), strict=False):
+        np.testing.assert_array_equal(before[:, px:], after[:, :-px])
+
+
+def test_an_anchor_that_is_missing_is_replaced_by_the_frame_after_it() -> None:
+    # Frame 2 is an anchor, and the film has frames 0, 1, 3 and 4.
+    film_with_gap = anchors([0, 1, 3, 5], 2, 1.0, [0, 1, 3, 4])
+    ends = StreamWalk().streams(film_with_gap, wall)
+    begins = StreamWalk().streams(begun_at(2, film_with_gap.frames[2:]), wall)
     np.testing.assert_array_equal(ends.names, begins.names)
     np.testing.assert_array_equal(ends.shifts, begins.shifts)
 
