@@ -20,7 +20,7 @@ from pbrs_farm.operating_system import give_back_memory, peak_mb
 from pbrs_farm.raycast.variant import choose_variant, set_threads
 from pbrs_farm.run import plan
 from pbrs_farm.run.house_cache import HouseCache
-from pbrs_farm.run.processes.child_process import Handler, Message, Send
+from pbrs_farm.run.processes.messages import Handler, Message, Send
 from pbrs_farm.run.processes.render_task import Event, RenderTask, Setting, task_from_line
 from pbrs_farm.run.step_cache import Outcome, Work
 from pbrs_farm.store import store_from_url

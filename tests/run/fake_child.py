@@ -7,7 +7,7 @@ from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
 
-from pbrs_farm.run.processes.child_process import Message, MessageKind
+from pbrs_farm.run.processes.messages import Message, MessageKind
 
 
 @dataclass

@@ -15,8 +15,9 @@ import pytest
 
 from pbrs_farm.operating_system import can_fork
 from pbrs_farm.run.processes import child_process
-from pbrs_farm.run.processes.child_process import ChildProcess, Handler, Message, Send
+from pbrs_farm.run.processes.child_process import ChildProcess
 from pbrs_farm.run.processes.limits import ProcessLimits
+from pbrs_farm.run.processes.messages import Handler, Message, Send
 from pbrs_farm.run.processes.render_process import Ended, RenderProcess
 from tests.run.fake_child import FakeChild, FakeClock
 

@@ -8,7 +8,7 @@ from pbrs_farm.core.recipe import recipe_from_name
 from pbrs_farm.prepare.source import resolve
 from pbrs_farm.run import run_task
 from pbrs_farm.run.house_cache import HouseCache
-from pbrs_farm.run.processes.child_process import Message
+from pbrs_farm.run.processes.messages import Message
 from pbrs_farm.run.processes.render_task import RenderTask, Setting
 
 

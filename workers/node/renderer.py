@@ -8,7 +8,7 @@ from __future__ import annotations
 
 import traceback
 
-from pbrs_farm.run.processes.child_process import Handler, Message, Send
+from pbrs_farm.run.processes.messages import Handler, Message, Send
 from workers.config import config_from_environment
 from workers.node.faults import class_of, fingerprint, one_line
 from workers.runner import StepRunner, TaskRequest, runner_maker

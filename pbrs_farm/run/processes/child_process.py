@@ -9,11 +9,9 @@ import os
 import pkgutil
 import subprocess
 import sys
-from collections.abc import Callable
-from dataclasses import asdict, dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import IO, Any, Final, Literal, NoReturn, Protocol
+from typing import IO, Final, NoReturn, Protocol
 
 from pbrs_farm.crash_notes import sends_notes
 from pbrs_farm.operating_system import (
@@ -167,32 +165,3 @@ def _serve(target: str) -> NoReturn:
 
     # In a context of its own, without the parent's notes.
     end(contextvars.Context().run(main, target))
-
-
-# ready: it may be given a task. step: a step begins. waiting: storage does not answer.
-# share: how much of the step is done, 0..1. event: something else its parent wants to know.
-# done, fault: the end of the task.
-MessageKind = Literal["ready", "step", "waiting", "share", "event", "done", "fault"]
-
-
-@dataclass(frozen=True, slots=True)
-class Message:
-    """One line from a render process."""
-
-    kind: MessageKind
-    text: str = ""
-    body: dict[str, Any] = field(default_factory=dict)  # JSON values that its parent understands
-
-    def line(self) -> bytes:
-        """The message as one line for message_from_line; the body must be JSON values."""
-        return json.dumps(asdict(self), separators=(",", ":")).encode() + b"\n"
-
-
-def message_from_line(line: bytes) -> Message:
-    """The message a line holds."""
-    return Message(**json.loads(line))
-
-
-Send = Callable[[Message], None]
-# Runs the task a request line names; its last message, done or fault.
-Handler = Callable[[bytes], Message]

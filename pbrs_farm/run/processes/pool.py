@@ -11,9 +11,9 @@ from types import TracebackType
 from typing import Final
 
 from pbrs_farm.operating_system import wait_readable
-from pbrs_farm.run.processes.child_process import Message
 from pbrs_farm.run.processes.early_start import FINISHING_HANDLER, child_of
 from pbrs_farm.run.processes.limits import ProcessLimits
+from pbrs_farm.run.processes.messages import Message
 from pbrs_farm.run.processes.render_process import CHECK_EVERY_S, Ended, RenderProcess
 from pbrs_farm.run.processes.render_task import Event, RenderTask, Setting, line_from_task
 

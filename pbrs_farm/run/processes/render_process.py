@@ -13,8 +13,9 @@ from dataclasses import dataclass, field
 from typing import Any, Final
 
 from pbrs_farm.operating_system import ending, was_killed
-from pbrs_farm.run.processes.child_process import Child, Message, message_from_line
+from pbrs_farm.run.processes.child_process import Child
 from pbrs_farm.run.processes.limits import ProcessLimits
+from pbrs_farm.run.processes.messages import Message, message_from_line
 
 CHECK_EVERY_S: Final = 1.0
 REPORTED: Final = "reported"

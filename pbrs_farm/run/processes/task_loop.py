@@ -19,7 +19,7 @@ from typing import BinaryIO, NoReturn
 
 from pbrs_farm.crash_notes import set_watched
 from pbrs_farm.operating_system import die_with_parent
-from pbrs_farm.run.processes.child_process import Message
+from pbrs_farm.run.processes.messages import Message
 
 
 def main(target: str) -> int:
