@@ -18,6 +18,8 @@ import shutil
 import subprocess
 import tarfile
 import tempfile
+import time
+import zlib
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from functools import lru_cache
@@ -29,6 +31,9 @@ from pbrs_farm.core.errors import MachineFailed
 
 APT_TIMEOUT_S: Final = 600  # of one download
 _LOOK_EVERY: Final = 32  # new files of a folder
+_DAY_S: Final = 86_400
+_SCRATCH: Final = ""  # ending of a file that write_whole has not renamed yet
+_SHORT_LIVED: Final = (_SCRATCH, ".index")  # endings of files that go after a day without use
 _NOTE: Final = ".sha256"  # ending of the file beside a package that holds its hash
 
 
@@ -255,17 +260,31 @@ def write_whole(path: Path, data: bytes) -> None:
     Path(scratch.name).replace(path)
 
 
-def drop_oldest(written: Path, most_bytes: int) -> None:
-    """Remove the oldest files of a new one's folder while they have more bytes than that.
+def read_used(path: Path) -> bytes:
+    """The bytes of a file of the cache, which drop_oldest then takes for a new one."""
+    data = path.read_bytes()
+    with contextlib.suppress(OSError):  # works without a writable cache
+        os.utime(path)
+    return data
 
-    Looks once per 32 new files whose names are hexadecimal digests.
+
+def drop_oldest(written: Path, most_bytes: int, *, every: int = _LOOK_EVERY) -> None:
+    """Remove the folder's oldest files until at most most_bytes remain.
+
+    A file is as old as its writing or its last read_used. Indexes and scratch files of killed processes
+    have a day. Looks once per `every` new files, chosen by their names.
     """
-    if int(written.name[:8], 16) % _LOOK_EVERY:
+    if zlib.crc32(written.name.encode()) % every:
         return
     files = []
-    for path in written.parent.glob("*.*"):
+    yesterday = time.time() - _DAY_S
+    for path in filter(Path.is_file, written.parent.iterdir()):
         with contextlib.suppress(FileNotFoundError):  # another process took it out
-            files.append(((s := path.stat()).st_mtime, s.st_size, path))
+            status = path.stat()
+            if path.suffix in _SHORT_LIVED and status.st_mtime < yesterday:
+                path.unlink()
+            elif path.suffix != _SCRATCH:
+                files.append((status.st_mtime, status.st_size, path))
     spare = sum(n_bytes for _modified, n_bytes, _path in files) - most_bytes
     for _modified, n_bytes, path in sorted(files):
         if spare <= 0:

@@ -14,7 +14,7 @@ from typing import Final
 
 from pydantic import TypeAdapter, ValidationError
 
-from pbrs_farm.assets.debian import drop_oldest, write_whole
+from pbrs_farm.assets.debian import drop_oldest, read_used, write_whole
 from pbrs_farm.core import keys
 from pbrs_farm.core.house import Material, Texture
 from pbrs_farm.dress.content import content
@@ -56,7 +56,7 @@ class PaintedBank:
             return paint()
         path = self._folder / f"{keys.digest(key, _makers())}.painted"
         with suppress(OSError, ValueError):
-            return _unpacked(path.read_bytes())
+            return _unpacked(read_used(path))
         painted = paint()
         with suppress(OSError):
             self._folder.mkdir(parents=True, exist_ok=True)

@@ -3,11 +3,13 @@
 from __future__ import annotations
 
 import hashlib
+import os
+import sys
 from collections.abc import Sequence
 from dataclasses import replace
 from functools import cache, lru_cache
-from importlib.metadata import version
 from pathlib import Path
+from typing import Final
 
 from pbrs_farm.assets import furniture_package, homes_package
 from pbrs_farm.assets.debian import cache_folder
@@ -25,6 +27,8 @@ NO_FURNITURE = "no-furniture"
 
 GENERATED = "generated"
 """Word of dress.catalogue that excludes the packages."""
+
+_CODE: Final = {".py", ".csv", ".toml"}
 
 
 def fetch_packages(words: str) -> None:
@@ -90,7 +94,7 @@ def _catalogue(
         from pbrs_farm.read.catalogue.read_catalogue import indexed
 
         files = [] if has_package is None else _files_of_packages(has_package=has_package)
-        name = keys.digest(_code_of_catalogue(), licences, has_package, files)
+        name = keys.digest(digest_of_code(), licences, has_package, files)
         catalogue = indexed(_store() / f"{name}.index", whole)
     return replace(catalogue, painted_folder=cache_folder() / "painted")
 
@@ -111,34 +115,32 @@ def _through_store(catalogue: Catalogue) -> Catalogue:
     """The catalogue with generated furniture from the store, too: its shapes depend on the code alone."""
     from pbrs_farm.read.catalogue.read_catalogue import ShapeStore
 
-    store, code = ShapeStore(_store()), _code_of_catalogue()
-    made = {p.id: (code, p.id) for p in catalogue.pieces if p.id not in catalogue.stored}
+    store, code = ShapeStore(_store()), digest_of_code()
+    keys_of_ours = {p.id: (code, p.id) for p in catalogue.pieces if p.id not in catalogue.stored}
 
     def load(piece: Piece) -> Shape | None:
-        if piece.id not in made:
+        if piece.id not in keys_of_ours:
             return catalogue.load(piece)
-        return store.shape(made[piece.id], lambda: catalogue.load(piece))
+        return store.shape(keys_of_ours[piece.id], lambda: catalogue.load(piece))
 
-    return replace(catalogue, load=load, stored={**catalogue.stored, **made})
+    return replace(catalogue, load=load, stored={**catalogue.stored, **keys_of_ours})
 
 
 @cache
-def _code_of_catalogue() -> str:
-    """The digest of the code that reads furniture and makes ours, and of its tables."""
-    ours = Path(__file__).parents[1]
-    digest = hashlib.sha256(version("numpy").encode())
-    folders = (
-        "core",
-        "geometry",
-        "read/catalogue",
-        "read/common",
-        "read/mesh",
-        "dress",
-        "furnishings/things",
-    )
-    for folder in folders:
-        for path in sorted((ours / folder).glob("*.*")):
-            digest.update(path.read_bytes())
+def digest_of_code(package: Path = Path(__file__).parents[1]) -> str:
+    """The digest of a package's code and tables, of Python and of the installed packages, whatever they do.
+
+    A list of the modules that furniture depends on would not stay true.
+    """
+    digest = hashlib.sha256(sys.version.encode())
+    # The folders' names hold the versions, which importlib would take twenty times as long to parse.
+    installed = {path.name for place in sys.path for path in Path(place).glob("*.dist-info")}
+    digest.update("\n".join(sorted(installed)).encode())
+    places = (Path(folder, name) for folder, _, names in os.walk(package) for name in names)
+    for path in sorted(path for path in places if path.suffix in _CODE):
+        data = path.read_bytes()
+        digest.update(f"\n{path.relative_to(package).as_posix()} {len(data)}\n".encode())
+        digest.update(data)
     return digest.hexdigest()
 
 

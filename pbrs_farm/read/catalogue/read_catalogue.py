@@ -18,7 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 from pydantic import TypeAdapter
 
-from pbrs_farm.assets.debian import drop_oldest, write_whole
+from pbrs_farm.assets.debian import drop_oldest, read_used, write_whole
 from pbrs_farm.core import keys
 from pbrs_farm.core.catalogue import Catalogue, Picture, Piece, Shape
 from pbrs_farm.core.errors import BadInput
@@ -84,15 +84,21 @@ class ShapeStore:
         self._folder = folder
 
     def shape(self, key: StoreKey, make: Callable[[], Shape | None]) -> Shape | None:
-        """The cached shape of a key, which names all inputs; made if missing. None, cached too: unreadable."""
+        """The cached shape of a key, which names all inputs; made if missing. None, cached too: unreadable.
+
+        Its arrays are read-only.
+        """
         path = self._folder / f"{keys.digest(FORMAT, *key)}.shape"
-        with suppress(OSError, ValueError):
-            return _unpacked(path.read_bytes())
+        with suppress(OSError, ValueError, TypeError, OverflowError):
+            return _unpacked(read_used(path))
         shape = make()
+        packed = _packed(shape)
         with suppress(OSError):
             self._folder.mkdir(parents=True, exist_ok=True)
-            write_whole(path, _packed(shape))
+            write_whole(path, packed)
             drop_oldest(path, MOST_BYTES)
+        with suppress(ValueError):  # an infinite limit of a joint cannot be stored
+            return _unpacked(packed)  # what a later call returns
         return shape
 
 
@@ -124,7 +130,7 @@ def _aligned(n_bytes: int) -> int:
 
 
 def _unpacked(data: bytes) -> Shape | None:
-    """Inverse of _packed; ValueError for any other data."""
+    """Inverse of _packed; ValueError, TypeError or OverflowError for any other data."""
     if data == _UNUSABLE:
         return None
     end = data.index(b"\n") + 1
@@ -134,7 +140,7 @@ def _unpacked(data: bytes) -> Shape | None:
     def taken(n_bytes: int) -> int:
         nonlocal start
         start += _aligned(n_bytes)
-        if start > len(data):
+        if n_bytes < 0 or start > len(data):
             raise ValueError("cut short")
         return start - _aligned(n_bytes)
 
@@ -142,6 +148,8 @@ def _unpacked(data: bytes) -> Shape | None:
         if described is None:
             return None
         kind, shape = np.dtype(described[0]), described[1]
+        if kind.kind not in "fiu":
+            raise ValueError("not numbers")
         n = prod(shape)
         first = taken(n * kind.itemsize)
         return np.frombuffer(data, kind, n, first).reshape(shape)
@@ -149,13 +157,15 @@ def _unpacked(data: bytes) -> Shape | None:
     surfaces = []
     for s in d.surfaces:
         positions, faces, uvs, normals = map(array, s.arrays)
-        assert positions is not None
-        assert faces is not None
+        if positions is None or faces is None:
+            raise ValueError("a surface without triangles")
         surfaces.append(Surface(s.name, positions, faces, s.material, uvs, normals, s.part))
     textures = {}
     for id_, name, kind, n_bytes in d.textures:
         first = taken(n_bytes)
         textures[id_] = Texture(id_, name, kind, data[first : first + n_bytes])
+    if start != len(data):
+        raise ValueError("too long")
     return Shape(tuple(surfaces), d.materials, textures, d.lights, d.joints)
 
 
@@ -249,7 +259,7 @@ def indexed(path: Path, make: Callable[[], Catalogue]) -> Catalogue:
     """
     shapes = ShapeStore(path.parent)
     with suppress(OSError, ValueError):
-        data = path.read_bytes()
+        data = read_used(path)
         end = data.index(b"\n") + 1
         index = _INDEX.validate_json(data[:end])
         ends = [end + n for n in accumulate(index.sizes)]
@@ -261,7 +271,10 @@ def indexed(path: Path, make: Callable[[], Catalogue]) -> Catalogue:
         )
 
         def load(piece: Piece) -> Shape | None:
-            return shapes.shape(index.stored[piece.id], lambda: make().load(piece))
+            key = index.stored.get(piece.id)
+            if key is None:
+                return make().load(piece)
+            return shapes.shape(key, lambda: make().load(piece))
 
         return Catalogue(
             index.pieces, load, index.digest, pictures, index.notes, stored=index.stored
@@ -278,6 +291,7 @@ def indexed(path: Path, make: Callable[[], Catalogue]) -> Catalogue:
         write_whole(
             path, _INDEX.dump_json(index) + b"\n" + b"".join(p.texture.data for p in pictures)
         )
+        drop_oldest(path, MOST_BYTES, every=1)
     return catalogue
 
 
