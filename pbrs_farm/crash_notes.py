@@ -20,6 +20,8 @@ _MAX_CHARS: Final = 300  # maximum length of a file name in a note
 _FILE: ContextVar[int | None] = ContextVar("file", default=None)
 _FIRST_S: Final = 5.0  # seconds before the first line on a terminal
 _EVERY_S: Final = 30.0  # seconds between lines
+LINE_WRITER: Final = "pbrs-farm waiting lines"
+"""Name of the thread of waiting_lines, the only one that a fork may leave behind."""
 
 
 class _Waiting:
@@ -66,7 +68,7 @@ def is_watched() -> bool:
 
 
 def sends_notes() -> bool:
-    """True in the thread of a command's own process, which send_notes_to made it."""
+    """True in the main thread of a process started by run_watched."""
     return _FILE.get() is not None
 
 
@@ -96,7 +98,8 @@ def waiting_lines(
     if first_s is None:
         first_s = min(_FIRST_S, every_s) if sys.stderr.isatty() else every_s
     end = threading.Event()
-    thread = threading.Thread(target=_write_lines, args=(call, first_s, every_s, end), daemon=True)
+    args = (call, first_s, every_s, end)
+    thread = threading.Thread(target=_write_lines, args=args, name=LINE_WRITER, daemon=True)
     _NOW.is_shown, _NOW.step, _NOW.count = True, "", ""
     thread.start()
     try:

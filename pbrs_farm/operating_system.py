@@ -10,6 +10,7 @@ import atexit
 import contextlib
 import ctypes
 import errno
+import gc
 import os
 import platform
 import select
@@ -63,31 +64,42 @@ def can_fork() -> bool:
 def forked(serve: Callable[[], object], log: IO[bytes]) -> subprocess.Popen[bytes]:
     """A fork of this process in its own session that runs `serve`, with pipes and a log for standard error.
 
-    It keeps modules, and neither open files nor functions registered for the exit. Only if `can_fork`.
+    It keeps modules and objects, but each open file becomes /dev/null, and the exit calls neither the parent's
+    atexit functions nor any finalizer of `weakref.finalize`, even of an object that `serve` makes. Only if
+    `can_fork`.
     """
 
     def run() -> None:
         try:
-            # The other children's pipes are not ours, and Popen waits until its own is closed.
-            for link in list(Path("/proc/self/fd").iterdir()):
-                with contextlib.suppress(OSError):
-                    if int(link.name) > 2:
-                        os.close(int(link.name))
+            # Close the pipes of other children, and Popen's own, for which the parent waits. Their numbers stay
+            # taken: an inherited object that closes its file later must not close a new one.
+            numbers = [int(file.name) for file in OPEN_FILES.iterdir()]
+            nothing = os.open(os.devnull, os.O_RDWR)
+            for number in numbers:
+                if number > 2 and number != nothing:
+                    os.dup2(nothing, number, inheritable=False)
             atexit._clear()
+            gc.enable()
             serve()
         except BaseException:  # noqa: BLE001 - the parent's code must not run on here
             traceback.print_exc()
         os._exit(1)
 
-    for stream in (sys.stdout, sys.stderr):
-        with contextlib.suppress(OSError):
-            stream.flush()
+    flush_output()
     # Popen makes the pipes and forks; `run` never returns to it, so no program is executed.
     pipe = subprocess.PIPE
     return subprocess.Popen(
         [sys.executable], stdin=pipe, stdout=pipe, stderr=log,
         preexec_fn=run, restore_signals=False, **OWN_SESSION,
     )  # fmt: skip
+
+
+def flush_output() -> None:
+    """Flush standard output and error, unless they are closed."""
+    for stream in (sys.stdout, sys.stderr):
+        with contextlib.suppress(OSError, ValueError):
+            if stream is not None:  # None if the descriptor was closed at the start
+                stream.flush()
 
 
 def end_tree(process: subprocess.Popen[bytes]) -> None:

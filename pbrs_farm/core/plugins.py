@@ -29,6 +29,9 @@ PREFIX: Final = "plugin:"
 MAX_HOMES: Final = 1_000_000  # of one word
 _HINT: Final = "plugin:NAME,1..100 or plugin:NAME,7,option=x"
 
+LOADED: Final[set[str]] = set()
+"""Marks of the plugins whose code this process has imported; it may have started threads."""
+
 
 @dataclass(frozen=True, slots=True)
 class Plugin:
@@ -47,6 +50,7 @@ class Plugin:
 
     def load(self) -> Any:
         """Import its object; MachineFailed for any error of the import."""
+        LOADED.add(self.mark)
         try:
             return self.entry.load()
         except Exception as error:

@@ -63,11 +63,11 @@ def _pool(run: Run) -> Pool:
 
 
 def threads_of_process(run: Run) -> int:
-    """Threads that a process renders with: its share of the cores, or each would take them all."""
+    """Threads of each process: its share of the cores. With two processes both take all cores, or one less for small views."""
     n_cores, image = os.cpu_count() or 1, run.recipe.image
     if finishes_apart(run):
-        # Threads wait for work by asking for it all the time: for small views that is a seventh of
-        # the light's CPU, while the other process could use the core.
+        # Idle threads spin: for small views that is a seventh of the light's CPU, while the other
+        # process could use the core.
         n_samples = image.width_px * image.height_px * run.recipe.light.spp
         return n_cores - 1 if n_samples <= _FEW_SAMPLES else n_cores
     return max(1, n_cores // max(1, run.n_jobs))

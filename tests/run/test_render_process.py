@@ -6,13 +6,18 @@ import atexit
 import math
 import os
 import signal
+import subprocess
 import sys
+import threading
 import time
+from collections.abc import Sequence
 from functools import partial
 from pathlib import Path
+from typing import BinaryIO
 
 import pytest
 
+from pbrs_farm.crash_notes import LINE_WRITER, waiting_lines
 from pbrs_farm.operating_system import can_fork
 from pbrs_farm.run.processes import child_process
 from pbrs_farm.run.processes.child_process import ChildProcess
@@ -246,11 +251,25 @@ def test_only_a_process_without_threads_and_devices_is_forked(
 ) -> None:
     assert not child_process.may_fork()  # a test may hold anything
     monkeypatch.setattr(child_process, "sends_notes", lambda: True)
-    for name in ("drjit", "mitsuba", "moderngl", "obstore", "OpenImageIO", "torch"):
-        monkeypatch.delitem(sys.modules, name, raising=False)
+    monkeypatch.setattr(child_process, "_UNFORKABLE", frozenset({"moderngl"}))
+    monkeypatch.setattr(child_process, "LOADED", loaded := set[str]())
+    monkeypatch.delitem(sys.modules, "moderngl", raising=False)
+    threads = [threading.main_thread()]
+    monkeypatch.setattr(threading, "enumerate", lambda: threads)
     assert child_process.may_fork() == can_fork()
-    monkeypatch.setitem(sys.modules, "obstore", sys)
+    threads.append(threading.Thread(name=LINE_WRITER))
+    assert child_process.may_fork() == can_fork()
+    threads.append(threading.Thread())
     assert not child_process.may_fork()
+    threads.pop()
+    loaded.add("height of a-package 1")
+    assert not child_process.may_fork()
+    loaded.clear()
+    monkeypatch.setitem(sys.modules, "moderngl", sys)
+    assert not child_process.may_fork()
+
+
+_HELD: list[BinaryIO] = []
 
 
 def make_handler(send: Send) -> Handler:
@@ -263,20 +282,18 @@ def make_handler(send: Send) -> Handler:
             os.kill(os.getpid(), signal.SIGSEGV)
         if word == "hang":
             time.sleep(60)
+        if word == "close":  # files that the parent had open
+            for file in _HELD:
+                file.close()
         send(Message("event", word, {"pid": os.getpid()}))
         return Message("done", word)
 
     return handle
 
 
-@pytest.mark.parametrize("is_fork", [False, True])
-def test_real_processes_live_and_die_as_the_fake_ones(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, is_fork: bool
-) -> None:
-    if is_fork and not can_fork():
-        pytest.skip("forks on Linux only")
-    monkeypatch.setattr(child_process, "may_fork", lambda: is_fork)
-    start = partial(ChildProcess, "tests.run.test_render_process:make_handler", tmp_path / "log")
+def _live_and_die(log: Path) -> None:
+    """Have real processes act as the fake ones above; their output goes to a log."""
+    start = partial(ChildProcess, "tests.run.test_render_process:make_handler", log)
     process = RenderProcess(start, ProcessLimits(silence_s=2.0))
 
     def run(word: str) -> tuple[str, str]:
@@ -288,12 +305,42 @@ def test_real_processes_live_and_die_as_the_fake_ones(
     try:
         assert run("fine") == ("", "fine")
         assert process.log_tail() == "fine\n"
+        assert run("close") == ("", "close")
         assert run("crash") == ("crash", "its process was killed by SIGSEGV")
         assert run("fine") == ("", "fine")
         assert run("hang")[0] == "silent"
         assert run("fine") == ("", "fine")
     finally:
         process.close()
+
+
+def test_real_processes_live_and_die_as_the_fake_ones(tmp_path: Path) -> None:
+    _live_and_die(tmp_path / "log")
+
+
+def forking_verb(words: Sequence[str]) -> int:
+    """A command whose render processes are forks, while files are open and lines are written."""
+    _HELD.extend(os.fdopen(os.dup(0), "rb") for _k in range(10))
+    if words[1:]:
+        sys.stderr.close()
+    with waiting_lines("forks", first_s=60):
+        vars(child_process)["_started"] = None  # a call raises an error
+        _live_and_die(Path(words[0]))
+    return 0
+
+
+@pytest.mark.skipif(not can_fork(), reason="forks on Linux only")
+@pytest.mark.parametrize("without_output", [False, True])
+def test_forks_of_a_command_live_and_die_alike(tmp_path: Path, without_output: bool) -> None:
+    # In a fresh interpreter, as pytest's may have threads, OpenGL and Mitsuba.
+    words = ["tests.run.test_render_process:forking_verb", str(tmp_path / "log")]
+    words += ["close"] if without_output else []
+    code = "import sys; from pbrs_farm.run.processes.verb_process import run_watched as run; "
+    code += "sys.exit(run(sys.argv[1], sys.argv[2:], print))"
+    shell = 'exec "$@" >&-' if without_output else 'exec "$@"'
+    command = ["sh", "-c", shell, "sh", sys.executable, "-c", code, *words]
+    done = subprocess.run(command, stderr=subprocess.PIPE, text=True, check=False)
+    assert done.returncode == 0, done.stderr
 
 
 class _Kept:

@@ -9,11 +9,13 @@ import os
 import pkgutil
 import subprocess
 import sys
+import threading
 from functools import partial
 from pathlib import Path
 from typing import IO, Final, NoReturn, Protocol
 
-from pbrs_farm.crash_notes import sends_notes
+from pbrs_farm.core.plugins import LOADED
+from pbrs_farm.crash_notes import LINE_WRITER, sends_notes
 from pbrs_farm.operating_system import (
     OWN_SESSION,
     PATH_FROM_PARENT,
@@ -133,8 +135,13 @@ class ChildProcess:
         os.truncate(self._log, 0)
 
 
-_UNFORKABLE: Final = frozenset({"OpenImageIO", "drjit", "mitsuba", "moderngl", "obstore", "torch"})
-"""Modules that have threads or hold devices, which a fork would break."""
+# fmt: off
+_UNFORKABLE: Final = frozenset({
+    "OpenImageIO", "cupy", "drjit", "embreex", "jax", "mitsuba", "moderngl", "mujoco", "obstore",
+    "onnxruntime", "pxr", "pyarrow", "tensorflow", "torch",
+})
+# fmt: on
+"""Modules that have native threads or hold devices, which a fork would break."""
 # What all render processes load, without any of these.
 _LOADED_FIRST: Final = "pbrs_farm.run.steps"
 
@@ -142,9 +149,13 @@ _LOADED_FIRST: Final = "pbrs_farm.run.steps"
 def may_fork() -> bool:
     """Whether a render process is a fork of this one, which saves it half a second of loading modules.
 
-    Only of a command's own process: that of a notebook, a test or a farm may hold anything.
+    Only of a command's own process: that of a notebook, a test or a farm may hold anything. Nor with a plugin,
+    whose libraries are unknown, or with a thread, as its pool would wait for it in the child forever.
     """
-    return can_fork() and sends_notes() and _UNFORKABLE.isdisjoint(sys.modules)
+    if not (can_fork() and sends_notes()) or LOADED or not _UNFORKABLE.isdisjoint(sys.modules):
+        return False
+    threads = {t.name for t in threading.enumerate() if t is not threading.main_thread()}
+    return threads <= {LINE_WRITER}
 
 
 def _started(target: str, log: IO[bytes]) -> subprocess.Popen[bytes]:

@@ -1,24 +1,23 @@
 """The main loop of a render process: receives tasks, sends messages.
 
 Effects: those of the tasks; ends when its parent does. It is started afresh, or forked from a process
-without S3 and Mitsuba (child_process.may_fork), so that both are safe in it, and may be killed at any moment. Requests are lines on the original stdin,
-messages go to the original stdout; libraries print to stderr, the task's log.
+without S3 and Mitsuba (child_process.may_fork), so that both are safe in it, and may be killed at any
+moment. Requests are lines on the original stdin, messages go to the original stdout; libraries print to
+stderr, the task's log.
 """
 
 from __future__ import annotations
 
 import atexit
-import contextlib
 import gc
 import os
 import pkgutil
 import signal
-import sys
 import traceback
 from typing import BinaryIO, NoReturn
 
 from pbrs_farm.crash_notes import set_watched
-from pbrs_farm.operating_system import die_with_parent
+from pbrs_farm.operating_system import die_with_parent, flush_output
 from pbrs_farm.run.processes.messages import Message
 
 
@@ -58,9 +57,7 @@ def main(target: str) -> int:
 def end(code: int) -> NoReturn:
     """Run the atexit functions and end this process now, without the 0.12 s of tearing down Mitsuba."""
     atexit._run_exitfuncs()
-    for stream in (sys.stdout, sys.stderr):
-        with contextlib.suppress(OSError):
-            stream.flush()
+    flush_output()
     os._exit(code)
 
 

@@ -4,6 +4,9 @@ from __future__ import annotations
 
 import json
 import os
+import subprocess
+import sys
+from pathlib import Path
 
 import pytest
 
@@ -208,3 +211,27 @@ def test_preemption_returns_tasks_not_begun_and_reports_finished_ones(bench: Ben
     assert list(bench.ledger.finished) == [TASK]
     assert [f.fault for t in (SECOND, THIRD) for f in bench.ledger.faults[t]] == ["preempted"] * 2
     assert bench.ledger.leases == {}
+
+
+# For a fresh interpreter, as pytest's is never forked.
+_START_OF_SLOT = """
+import sys
+from pathlib import Path
+from pbrs_farm.run.processes import child_process
+from workers.config import FarmConfig
+from workers.node import slot
+from pbrs_farm.store.secret import Secret
+
+def started(_target, _log):
+    sys.exit("started afresh")
+
+child_process._started = started
+slot.RedisLedger = slot.Registry = lambda _argument: None
+slot.make_slot(FarmConfig(Secret("memory://"), scratch=Path(sys.argv[1])))
+"""
+
+
+def test_a_slot_does_not_fork_its_render_process(tmp_path: Path) -> None:
+    command = [sys.executable, "-c", _START_OF_SLOT, str(tmp_path)]
+    done = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert "started afresh" in done.stderr
