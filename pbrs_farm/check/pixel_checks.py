@@ -33,7 +33,7 @@ _RAY_ERROR_MM = 2e-4  # per metre of depth, over the cosine: float32 directions 
 _MAX_RAY_ERROR_MM = 5.0
 _NORMAL_DEG = 0.02  # tolerance of a normal
 _SHADING_DEG = 0.5  # the same between texels of a map, whose bytes are half a degree apart
-_BATCH = 100_000  # triangles that rays are asked for at once
+_BATCH = 100_000  # candidate triangles of one batch
 _TIE_M = 1e-4  # two surfaces closer than this, across them, may both be hit
 _METRES = 2e-4  # tolerance of depths and positions stored as floats
 _ALBEDO_STEPS = 2.5  # of 255
@@ -354,15 +354,15 @@ def _pierced_beside(cast: Cast, candidates: Callable[[int], I64]) -> I64:
 
 def _batches(candidates: Callable[[int], I64], n_rays: int) -> Iterator[tuple[I64, I64]]:
     """(ray, face) pairs of all rays and their candidates, some 100,000 at a time, each ray's together."""
-    found: list[I64] = []
-    n_found = 0
+    parts: list[I64] = []
+    n_faces = 0
     for k in range(n_rays):
-        found.append(candidates(k))
-        n_found += len(found[-1])
-        if k == n_rays - 1 or n_found > _BATCH:
-            rays = np.arange(k + 1 - len(found), k + 1)
-            yield np.repeat(rays, [len(faces) for faces in found]), np.concatenate(found)
-            found, n_found = [], 0
+        parts.append(candidates(k))
+        n_faces += len(parts[-1])
+        if k == n_rays - 1 or n_faces > _BATCH:
+            rays = np.arange(k + 1 - len(parts), k + 1)
+            yield np.repeat(rays, [len(faces) for faces in parts]), np.concatenate(parts)
+            parts, n_faces = [], 0
 
 
 def _number_planes(corners: F64) -> I64:

@@ -1,4 +1,4 @@
-"""radiance.exr against light that is traced again. Effects: traces light."""
+"""radiance.exr against a second tracing of its light. Effects: traces light."""
 
 from __future__ import annotations
 

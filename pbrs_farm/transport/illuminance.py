@@ -163,7 +163,7 @@ def _radiosity(context: PathContext, p: Any, normal: Any, key: Any, spp: Any) ->
     """Sums over spp samples of (outdoor, indoor) radiance reflected by a white surface."""
     outdoor, indoor = mi.Color3f(0), mi.Color3f(0)
     s = mi.UInt32(0)
-    # What stays the same is no state of the loops: Dr.Jit would trace their code twice each.
+    # Constants are excluded from the state of the loops, or Dr.Jit traces their code twice.
     while dr.hint(s < spp, exclude=[context, p, normal, key, spp]):
         # Add direct light at the point.
         sampler = SobolSampler(key, s)

@@ -457,7 +457,7 @@ def _trace(
     if dr.hint(context.splits_white, mode="scalar"):
         diffuse = _no_diffuse_sums()
 
-    # What stays the same is no state of the loop: Dr.Jit would trace its code twice.
+    # Constants are excluded from the state of the loop, or Dr.Jit traces its code twice.
     while dr.hint(active, exclude=[context, camera, corner, last, numbers, beside]):
         # Start the next sample where the last path has ended.
         sampler, place = numbers.of_sample(s)

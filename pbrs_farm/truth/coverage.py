@@ -45,7 +45,7 @@ def _pinhole_coverage(item: Item, camera: Camera, cut_outs: CutOuts) -> Mask:
             _cover_without_holes(covered, corners, s, cut_outs[s.material], i)
         else:
             solid.append(finite_triangles(corners))
-    # All at once: most surfaces are small.
+    # In one call, as most surfaces are small.
     if solid:
         for spans in _spans_of_triangles(np.concatenate(solid), i):
             _add_spans(starts, spans)

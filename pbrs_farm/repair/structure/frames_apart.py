@@ -36,7 +36,7 @@ _TURN = 0.015  # between unit normals whose cosine is that
 _LEAST_AREA_M2 = 1e-5  # that two faces must share
 _SEEN_M2 = 1e-3  # that parts must share: less is a few pixels from near
 _LEAST_FACE_M2 = 1e-4  # minimum face area; smaller faces belong to round shapes
-_MOST_PAIRS = 256  # of triangles: the outlines of more are compared at once
+_MOST_PAIRS = 256  # of triangles; outlines of parts with more are compared without this test
 _ROUNDS = 3  # parts that lie in one plane by threes are moved by steps
 
 

@@ -1,4 +1,4 @@
-"""What a render process tells its parent: one line of JSON a message; no effects."""
+"""Messages of a render process to its parent, one line of JSON each. Effects: none."""
 
 from __future__ import annotations
 

@@ -230,7 +230,7 @@ class DeviceScene:
         end, is_finite = o + distance * d, distance < dr.inf
         go_on = mi.Bool(clear)
         n = mi.UInt32(0)
-        # What stays the same is no state of the loop: Dr.Jit would trace its code twice.
+        # Constants are excluded from the state of the loop, or Dr.Jit traces its code twice.
         while dr.hint(go_on, exclude=[self, d, end, is_finite]):
             way = mi.Vector3f(d)
             if dr.hint(self._aims_again, mode="scalar"):

@@ -118,7 +118,7 @@ def _worth_of(
     """Mean of wanted over the voxels where rays that scatter from si end."""
     begin, frame = offset_ray_origin(si.p, si.ng), mi.Frame3f(si.ng)
     total, n = mi.Float(0), mi.UInt32(0)
-    # What stays the same is no state of the loop: Dr.Jit would trace its code twice.
+    # Constants are excluded from the state of the loop, or Dr.Jit traces its code twice.
     while dr.hint(active, exclude=[scene, grid, wanted, sampler, begin, frame]):
         wo = mi.warp.square_to_cosine_hemisphere(sampler.get_2d(4 + 2 * n))
         d = mi.Vector3f(frame.to_world(wo))
