@@ -23,6 +23,7 @@ from pbrs_farm.core.errors import PbrsError
 from pbrs_farm.core.shown_text import did_you_mean
 from pbrs_farm.crash_notes import waiting_lines
 from pbrs_farm.installation import EXTRA_OF, install_command
+from pbrs_farm.operating_system import open_standard_streams
 
 # Module of pbrs_farm.commands -> its verbs, in the order of the help.
 MODULES: Final = {
@@ -48,6 +49,7 @@ def command() -> int:
 
     If a library crashes on such a file, only the child ends, and the parent prints an error line.
     """
+    open_standard_streams()
     words = _verb_first(sys.argv[1:])
     if _module_of(words) not in OF_STRANGERS:
         return main(words)

@@ -94,6 +94,15 @@ def forked(serve: Callable[[], object], log: IO[bytes]) -> subprocess.Popen[byte
     )  # fmt: skip
 
 
+def open_standard_streams() -> None:
+    """Replace standard streams that were closed at the start (>&-) with /dev/null, also for child processes."""
+    for name in ("stdin", "stdout", "stderr"):
+        if getattr(sys, name) is None:
+            number = os.open(os.devnull, os.O_RDWR)  # the lowest free number, so the stream's
+            os.set_inheritable(number, True)
+            setattr(sys, name, os.fdopen(number, "r" if name == "stdin" else "w"))
+
+
 def flush_output() -> None:
     """Flush standard output and error, unless they are closed."""
     for stream in (sys.stdout, sys.stderr):

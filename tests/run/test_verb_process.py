@@ -90,6 +90,26 @@ def test_ctrl_c_keeps_its_handler_afterwards() -> None:
     assert signal.getsignal(signal.SIGINT) is before
 
 
+_COMMAND = """
+import sys
+from pbrs_farm import cli
+from pbrs_farm.run.processes import verb_process
+watched = verb_process.run_watched
+words = ["tests.run.dying_verbs:main", ["end", "0"]]
+verb_process.run_watched = lambda _target, _words, warn: watched(*words, warn)
+sys.argv = ["pbrs-farm", "run"]
+code = cli.main()
+sys.stderr.write("ended\\n")
+sys.exit(code)
+"""
+
+
+@pytest.mark.skipif(os.name != "posix", reason="the shell's >&-")
+def test_a_command_may_be_started_without_standard_streams() -> None:
+    command = ["sh", "-c", 'exec "$@" <&- >&- 2>&-', "sh", sys.executable, "-c", _COMMAND]
+    assert subprocess.run(command, check=False).returncode == 0
+
+
 @pytest.mark.quick(1)
 @pytest.mark.parametrize(
     ("words", "line"),
