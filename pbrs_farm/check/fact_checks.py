@@ -39,7 +39,7 @@ def check_facts(case: ViewCase) -> None:
     table, place = view.table, case.place
     judge("view", place, tally, view=table, house=house, folder=view.folder)
     if house.recipe and "recipe" in table:
-        digest = _digest(house.recipe, picture_groups())
+        digest = _recipe_digest(house.recipe, picture_groups())
         judge("view recipe", place, tally, view=table, digest=digest)
     _check_camera_row(case)
     for row in table["instances"]:
@@ -57,7 +57,7 @@ def check_facts(case: ViewCase) -> None:
         _check_light_facts(case)
 
 
-def _digest(recipe: Mapping[str, Any], groups: tuple[str, ...]) -> str:
+def _recipe_digest(recipe: Mapping[str, Any], groups: tuple[str, ...]) -> str:
     fields = {g: recipe[g] for g in ("seed", *groups) if recipe.get(g) is not None}
     return keys.digest(fields)
 
@@ -238,7 +238,7 @@ def _check_light_facts(case: ViewCase) -> None:
     fields = house.recipe["light"]
     # light.groups adds layers and changes no picture.
     drawn = {**house.recipe, "light": {k: v for k, v in fields.items() if k != "groups"}}
-    digest = _digest(drawn, groups_of_step("light"))
+    digest = _recipe_digest(drawn, groups_of_step("light"))
     seed = view.shot.seed(house.id, "light", digest, per="eye")
     judge("light seed", place, tally, light=light, seed=seed)
     expect = case.expect("light facts")

@@ -49,7 +49,7 @@ def check_pairs(case: HouseCase) -> None:
         shares = {"a_in_b": _share(a, b, case.rest.rays), "b_in_a": _share(b, a, case.rest.rays)}
         judge("pair shares", _place(case, row), case.tally, row=row, shares=shares)
     for row in rows:
-        _check_row(case, row, [views[row["view_a"]], views[row["view_b"]]])
+        _check_pair(case, row, [views[row["view_a"]], views[row["view_b"]]])
     # Each pair of views of a room has a row.
     counts = Counter(view["room"] for view in views.values())
     n_pairs = sum(n * (n - 1) // 2 for n in counts.values())
@@ -61,7 +61,7 @@ def _place(case: HouseCase, row: dict[str, Any]) -> str:
     return f"{case.house.id}: {row['view_a']}, {row['view_b']}"
 
 
-def _check_row(case: HouseCase, row: dict[str, Any], views: list[dict[str, Any]]) -> None:
+def _check_pair(case: HouseCase, row: dict[str, Any], views: list[dict[str, Any]]) -> None:
     """Rooms of a pair, and the columns that follow from its shares and cameras."""
     a, b = (_camera(view) for view in views)
     cosine = float(np.clip(a.world_from_camera[:3, 2] @ b.world_from_camera[:3, 2], -1, 1))

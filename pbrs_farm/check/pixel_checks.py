@@ -343,7 +343,7 @@ def _pierced_beside(cast: Cast, candidates: Callable[[int], I64]) -> I64:
     depth = cast.z - way
     # Measure gaps across the surface: along a slanting ray they are longer.
     across = np.abs(dot(cast.normal, cast.directions))
-    for ray, faces in _batches(candidates, len(cast)):
+    for ray, faces in _candidate_batches(candidates, len(cast)):
         gap = np.abs(distances_pierced(triangles, faces, starts[ray], legs[ray]) - depth[ray])
         order = np.lexsort((gap, ray))
         least = order[np.unique(ray[order], return_index=True)[1]]
@@ -352,7 +352,7 @@ def _pierced_beside(cast: Cast, candidates: Callable[[int], I64]) -> I64:
     return rays.without_holes(nearest, cast.origin, cast.directions)
 
 
-def _batches(candidates: Callable[[int], I64], n_rays: int) -> Iterator[tuple[I64, I64]]:
+def _candidate_batches(candidates: Callable[[int], I64], n_rays: int) -> Iterator[tuple[I64, I64]]:
     """(ray, face) pairs of all rays and their candidates, some 100,000 at a time, each ray's together."""
     parts: list[I64] = []
     n_faces = 0

@@ -38,7 +38,7 @@ def check_projector(case: ViewCase) -> None:
     to = point - eye
     distance, along = np.linalg.norm(to, axis=1), to @ ahead
     angles = np.arctan2(np.stack([to @ right, -(to @ down)], axis=1), along[:, None])
-    light = np.where(along > 0, _pattern(angles), 0.0)
+    light = np.where(along > 0, _dot_pattern(angles), 0.0)
     cosine = np.abs(dot(cast.normal, to)) / np.maximum(distance, 1e-6)
     infrared = linear_from_srgb(albedo_of(view, cast).max(axis=1) / 255)
     level = np.clip(light * infrared * cosine * (_FULL_M / np.maximum(distance, 1e-3)) ** 2, 0, 1)
@@ -50,7 +50,7 @@ def check_projector(case: ViewCase) -> None:
     case.tally.tolerate("projector", case.place, len(cast), int(wrong.sum()), most, place)
 
 
-def _pattern(angles: F64) -> F64:
+def _dot_pattern(angles: F64) -> F64:
     """(N,) brightness 0..1 of the dots in directions (N, 2) in rad, right and up."""
     cell = np.floor(angles / _CELL_RAD)
     words = cell.astype(np.int64) & 0xFFFF

@@ -58,7 +58,7 @@ def check_traced(case: ViewCase) -> None:
     except (BadInput, RenderFailed) as error:
         expect(False, f"cannot be traced again: {error}")
         return
-    is_whole = resized_by_area(_shown(case).astype(np.float32), width, height) > 1 - 1e-6
+    is_whole = resized_by_area(_lit_pixels(case).astype(np.float32), width, height) > 1 - 1e-6
     level = _FALSE_ALARM / (len(traced) * 3 * len(_WINDOWS) * is_whole.size)
     for group, light in traced.items():
         for k, (colour, c) in enumerate({"red": "R", "green": "G", "blue": "B"}.items()):
@@ -77,7 +77,7 @@ def check_traced(case: ViewCase) -> None:
                 expect(worst.sigmas <= worst.allowed, fault)
 
 
-def _shown(case: ViewCase) -> Bools:
+def _lit_pixels(case: ViewCase) -> Bools:
     """(H, W) pixels with light: those with a ray, and of an object without context those that show it."""
     if keys.is_object(case.house.id):
         return np.asarray(case.arrays["instance"] > 0)

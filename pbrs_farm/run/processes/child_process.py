@@ -142,7 +142,7 @@ _UNFORKABLE: Final = frozenset({
 })
 # fmt: on
 """Modules that have native threads or hold devices, which a fork would break."""
-# What all render processes load, without any of these.
+# All render processes load this module, which loads none of these.
 _LOADED_FIRST: Final = "pbrs_farm.run.steps"
 
 
