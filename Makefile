@@ -66,7 +66,7 @@ check-fast: ## lint, import contracts and types of the files that differ from th
 	@files=$$({ git diff --name-only --diff-filter=d HEAD -- '*.py'; git ls-files -o --exclude-standard -- '*.py'; } | grep -E '^(pbrs_farm|workers|tests|benchmarks)/'); \
 	test -z "$$files" || $(BIN)/mypy $$files
 
-test: lint ## lint and the quick tests: six minutes on two cores; fetches the example homes for those that need them
+test: lint ## lint and the quick tests: seven minutes on two cores; fetches the example homes for those that need them
 	@$(example-homes)
 	$(BIN)/pytest -n 2 --dist worksteal -m "$(QUICK)"
 
